@@ -1,0 +1,117 @@
+"""The whole way without a notebook: python -m hdr_helpers BRACKET [-o OUT]"""
+
+import argparse
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hdr_helpers.align import align_mtb, crop_common
+from hdr_helpers.crf import recover_crf
+from hdr_helpers.load import Bracket, BracketError, load_bracket
+from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
+from hdr_helpers.tonemap import OPERATORS, dynamic_range_stops, tonemap, write_picture
+
+RADIANCE, CURVE, PLOT, PICTURE = "radiance.hdr", "crf.csv", "crf.png", "picture.png"
+
+
+def main(arguments=None) -> int:
+    """Run the command line. Returns the exit code: 0 done, 1 input or output can't be used (2 is argparse's)."""
+    options = _parser().parse_args(arguments)
+    out = options.out or Path(f"{options.bracket.resolve().stem}_hdr")
+    try:
+        _refuse_to_overwrite(out, options.overwrite)
+        started = time.perf_counter()
+        bracket = load_bracket(options.bracket)
+        _run(bracket, out, options)
+    except (BracketError, OSError) as problem:
+        print(f"hdr_helpers: {problem}", file=sys.stderr)
+        return 1
+    print(f"\nDone in {time.perf_counter() - started:.1f} s. The picture is {out / PICTURE}")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m hdr_helpers",
+        description="Merge photographs of one scene, taken with different exposure times, into a radiance "
+        "map; recover the camera's response curve; tone-map a picture.",
+        epilog=f"Written to OUT: {RADIANCE} (Radiance RGBE), {CURVE} and {PLOT} (log exposure of each pixel "
+        f"value), {PICTURE} (tone-mapped). Exposure times are taken from a text file beside the "
+        "photographs, from the file names or from EXIF, in this order. "
+        "Exit code: 0 done, 1 the input or the output can't be used, 2 wrong usage.",
+    )
+    parser.add_argument("bracket", type=Path, metavar="BRACKET", help="folder or zip with the photographs")
+    parser.add_argument("-o", "--out", type=Path, help="folder to write to (default: BRACKET's name and _hdr)")
+    parser.add_argument("--overwrite", action="store_true", help="replace results of an earlier run in OUT")
+    parser.add_argument("--no-align", action="store_true", help="the photographs lie on each other already")
+    parser.add_argument("--lam", type=float, default=50.0, help="smoothness of the curve (default: %(default)g)")
+    parser.add_argument(
+        "--tonemap", choices=sorted(OPERATORS), default="durand", help="operator (default: %(default)s)"
+    )
+    return parser
+
+
+def _refuse_to_overwrite(out: Path, allowed: bool) -> None:
+    if out.exists() and not out.is_dir():
+        raise FileExistsError(f"{out} is a file; give a folder to write to with -o.")
+    there = [name for name in (RADIANCE, CURVE, PLOT, PICTURE) if (out / name).exists()]
+    if there and not allowed:
+        raise FileExistsError(
+            f"{out} already holds {', '.join(there)}; give another folder with -o, or --overwrite."
+        )
+
+
+def _run(bracket: Bracket, out: Path, options) -> None:
+    # Only now: drawing is slow to import, and a typing error should not wait for it.
+    from hdr_helpers.lab.data import with_truth
+    from hdr_helpers.lab.figures import crf_figure, png_bytes
+    from hdr_helpers.lab.metrics import radiance_error
+
+    height, width = bracket.images[0].shape[:2]
+    print(f"{len(bracket)} photographs of {width} x {height} pixels; exposure times from {bracket.source}.")
+    for note in bracket.notes:
+        print(f"Note: {note}")
+
+    shares = clipping(bracket.images)
+    shifts, doubtful = np.zeros((len(bracket), 2), dtype=int), np.zeros(len(bracket), dtype=bool)
+    aligned = bracket
+    if not options.no_align:
+        alignment = align_mtb(bracket.images)
+        shifts, doubtful = alignment.shifts, alignment.doubtful
+        aligned = replace(bracket, images=crop_common(alignment.images, shifts))
+    print(f"\n{'photograph':24} {'time (s)':>10} {'shift (px)':>11} {'too dark':>9} {'too bright':>11}")
+    rows = zip(bracket.names, bracket.times, shifts, shares.too_dark, shares.too_bright, doubtful, strict=True)
+    for name, seconds, (dx, dy), dark, bright, doubt in rows:
+        mark = "  not sure of its shift; left beside its neighbour" if doubt else ""
+        print(f"{name:24} {seconds:10.6g} {f'{dx:+d} {dy:+d}':>11} {dark:9.2%} {bright:11.2%}{mark}")
+    print(
+        f"Clipped in every exposure: {shares.everywhere_bright:.3%} of the pixels are too bright in all of "
+        f"them, {shares.everywhere_dark:.3%} too dark."
+    )
+
+    crf = recover_crf(aligned, lam=options.lam)
+    radiance = merge_debevec(aligned.images, aligned.times, crf)
+    print(f"Dynamic range of the scene: {dynamic_range_stops(radiance):.1f} stops (99.9th over 0.1th percentile).")
+    picture = tonemap(radiance, options.tonemap)
+
+    truth = with_truth(bracket, options.bracket).truth
+    if truth is not None:
+        (known,) = crop_common([truth.radiance], shifts)
+        error = radiance_error(radiance, known)
+        print(f"The truth is known here: median error {error.median:.3f} stops, 95% below {error.p95:.3f}.")
+
+    table = np.column_stack([np.arange(crf.shape[1]), crf.T])
+    lines = ["value,red,green,blue", *(f"{int(z)},{r:.6f},{g:.6f},{b:.6f}" for z, r, g, b in table)]
+    out.mkdir(parents=True, exist_ok=True)
+    write_hdr(out / RADIANCE, radiance)
+    write_whole(out / CURVE, ("\n".join(lines) + "\n").encode())
+    write_whole(out / PLOT, png_bytes(crf_figure(crf)))
+    write_picture(out / PICTURE, picture)
+    print(f"\nWritten to {out}: {RADIANCE}, {CURVE}, {PLOT}, {PICTURE}.")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,141 @@
+"""Exposure times of a bracket: from text files, file names and EXIF, in seconds or as 1/seconds or EV.
+
+Where the times come from, in order of trust: a text file beside the photographs (someone wrote it for
+this set), times spelled in the file names, the EXIF tag ExposureTime. Whether a list holds seconds or
+1/seconds can't be told from the list; the photographs tell, because a longer exposure is brighter.
+"""
+
+import json
+import re
+import struct
+from pathlib import PurePosixPath
+
+import numpy as np
+
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".ppm")
+TEXT_SUFFIXES = (".txt", ".csv", ".json")
+ROUNDING = 0.05  # cameras print rounded times; two sources that differ by more are both reported
+
+
+class BracketError(ValueError):
+    """A bracket can't be used. The message names the file or value and what would be accepted."""
+
+
+def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, list[str]]:
+    """Exposure times in the order of names, where they came from, and notes on what was decided."""
+    found = [(f"the text file {name}", _text_values(name, data, names)) for name, data in texts.items()]
+    found += [("the file names", _name_values(names)), ("EXIF", exif if all(exif) else None)]
+    found = [(source, np.array(values, dtype=np.float64)) for source, values in found if values is not None]
+    if not found:
+        listed = f" {', '.join(texts)} held no line for each of the {len(names)} photographs." if texts else ""
+        raise BracketError(
+            f"No exposure times were found for the photographs in {path}.{listed} Put them in a text file "
+            "there, one line for each photograph, as in: img_1.jpg 1/60"
+        )
+    source, values = found[0]
+    times, notes = _as_seconds(source, values, brightness)
+    for other, theirs in found[1:]:
+        theirs, _ = _as_seconds(other, theirs, brightness)
+        ratio = theirs / times
+        ratio /= np.median(ratio)  # a factor common to all does no harm: radiance is relative
+        for i in np.flatnonzero(np.abs(ratio - 1) > ROUNDING):
+            notes.append(f"{names[i]}: {times[i]:.4g} s by {source}, {theirs[i]:.4g} s by {other}.")
+    return times, source, notes
+
+
+def _as_seconds(source, values, brightness) -> tuple[np.ndarray, list[str]]:
+    """Turn seconds, 1/seconds or EV stops into seconds: the photographs must get brighter with time."""
+    notes = []
+    if np.any(values <= 0):
+        values = np.exp2(values)
+        notes.append(f"{source[:1].upper()}{source[1:]} holds EV stops; times are relative, 2 to the EV.")
+    i, j = np.triu_indices(len(values), 1)
+    agreement = np.mean(np.sign(values[j] - values[i]) * np.sign(brightness[j] - brightness[i]))
+    if abs(agreement) < 0.5:
+        raise BracketError(
+            f"By {source} the photographs do not get brighter as the exposure gets longer; "
+            "check which time belongs to which photograph."
+        )
+    if agreement < 0:
+        values = 1 / values
+        notes.append(
+            f"{source[:1].upper()}{source[1:]} reads as 1/seconds: the photographs get darker as its "
+            "numbers grow."
+        )
+    return values, notes
+
+
+def _text_values(name: str, data: bytes, names: list[str]) -> list[float] | None:
+    """One number for each photograph from a text file; None where the file does not list times."""
+    text = data.decode("utf-8-sig", errors="replace")
+    rows = _json_rows(text) if name.lower().endswith(".json") else _line_rows(text)
+    named = {PurePosixPath(row[0]).stem.lower(): _number(row[1]) for row in rows
+             if len(row) > 1 and row[0].lower().endswith(IMAGE_SUFFIXES)}  # fmt: skip
+    if named:  # lists often name .ppm files where .png ones lie: the stem decides
+        missing = [n for n in names if named.get(PurePosixPath(n).stem.lower()) is None]
+        if missing:
+            raise BracketError(
+                f"{name} gives no exposure time for {missing[0]}; every photograph needs a line, "
+                f"as in: {missing[0]} 1/60"
+            )
+        return [named[PurePosixPath(n).stem.lower()] for n in names]
+    numbers = [[v for v in map(_number, row) if v is not None] for row in rows]
+    flat = [v for row in numbers for v in row]
+    return next((row for row in [flat, *numbers] if len(row) == len(names)), None)
+
+
+def _line_rows(text: str) -> list[list[str]]:
+    lines = (line.split("#")[0].replace(",", " ") for line in text.splitlines())
+    return [line.split() for line in lines if line.strip() and "=" not in line]
+
+
+def _json_rows(text: str) -> list[list[str]]:
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError:
+        return []
+    if isinstance(content, dict):
+        return [[str(k), str(v)] for k, v in content.items()]
+    return [[str(v) for v in row.values()] for row in content if isinstance(row, dict)]
+
+
+def _name_values(names: list[str]) -> list[float] | None:
+    """Times spelled in file names: img_0.033.jpg and img_15.jpg in seconds, exp_1_60.jpg as 1/60."""
+    stems = [PurePosixPath(n).stem for n in names]
+    fractions = [re.search(r"(?:^|\D)(1)_(\d+)$|(\d+)_(1)$", s) for s in stems]
+    if all(fractions):
+        return [float(m[1] or m[3]) / float(m[2] or m[4]) for m in fractions]
+    decimals = [re.search(r"(\d+(?:\.\d+)?)s?$", s) for s in stems]
+    # Frame counters are whole numbers too; only a decimal point somewhere says that these are times.
+    return [float(m[1]) for m in decimals] if all(decimals) and any("." in m[1] for m in decimals) else None
+
+
+def exif_exposure_time(exif: bytes) -> float | None:
+    """ExposureTime (tag 0x829A) in seconds from a raw EXIF block; None where it isn't there or is odd."""
+    tiff = exif.removeprefix(b"Exif\0\0")
+    order = {b"II": "<", b"MM": ">"}.get(tiff[:2])
+
+    def find(tag: int, directory: int) -> int | None:
+        (count,) = struct.unpack_from(order + "H", tiff, directory)
+        for entry in range(directory + 2, directory + 2 + 12 * count, 12):
+            found, _, _, value = struct.unpack_from(order + "HHII", tiff, entry)
+            if found == tag:
+                return value
+        return None
+
+    try:
+        (first,) = struct.unpack_from(order + "I", tiff, 4)
+        numerator, denominator = struct.unpack_from(order + "II", tiff, find(0x829A, find(0x8769, first)))
+    except (struct.error, TypeError):  # cut short, or one of the tags is missing
+        return None
+    return numerator / denominator if numerator and denominator else None
+
+
+def _number(word: str) -> float | None:
+    """15, 0.5 or 1/60 as a float; None for anything else."""
+    top, _, bottom = word.partition("/")
+    try:
+        value = float(top) / float(bottom or 1)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return value if np.isfinite(value) else None

@@ -1,0 +1,168 @@
+"""Stage 3: recover the camera response function.
+
+After P. Debevec and J. Malik, Recovering High Dynamic Range Radiance Maps from Photographs, SIGGRAPH
+1997. A pixel value Z of pixel i in photograph j obeys g(Z_ij) = ln E_i + ln dt_j (equation 2), where g is
+the log inverse response. Section 2.1 finds g and all ln E_i by linear least squares, equation 3.
+
+Each ln E_i stands only in the rows of its own pixel. For a given g its best value is therefore a
+weighted mean, and putting that mean back leaves a problem in the 256 values of g alone: 256 equations
+however many pixels there are. That is how gsolve works; the matrix of the paper's appendix is never built.
+"""
+
+import numpy as np
+import scipy.linalg
+
+from hdr_helpers.load import Bracket
+
+LEVELS = 256
+MIDDLE = 128  # g[MIDDLE] = 0 fixes the gauge: equation 3 leaves g free up to a constant
+CLIPPED = 250  # from here on a pixel value may be a clipped one, pulled down by noise or JPEG
+FLOOR = 1e-4  # least weight of a smoothness row, so that values that no weight reaches stay defined
+
+
+def hat_weights(black: int = 0, clipped: int = LEVELS) -> np.ndarray:
+    """Weight of each pixel value, a hat that trusts the middle (equation 4).
+
+    black : the camera's black level; values up to it get weight 0, and the hat rises from there
+    clipped : values from here on get weight 0
+    Returns (256,) float64. The defaults give the paper's hat: 0 at 0 and at 255, 127 in the middle.
+    """
+    z = np.arange(LEVELS)
+    w = np.clip(np.minimum(z - black, LEVELS - 1 - z), 0, None).astype(np.float64)
+    w[clipped:] = 0
+    return w
+
+
+def fitted_weights(images) -> np.ndarray:
+    """The hat over the pixel values that this camera can be trusted with: above black, below CLIPPED.
+
+    images : P arrays (H, W, 3) uint8, shortest exposure first
+    """
+    return hat_weights(black_level(images), CLIPPED)
+
+
+def black_level(images) -> int:
+    """The pixel value that stands for no light: 0 in most files, about 17 in some scans.
+
+    images : P arrays (H, W, 3) uint8, shortest exposure first
+    It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
+    nothing of the scene, yet each of the short exposures would say it with conviction.
+    """
+    shortest, longer = (image[::2, ::2] for image in images[:2])
+    joint = np.histogram2d(shortest.ravel(), longer.ravel(), bins=LEVELS, range=((0, LEVELS), (0, LEVELS)))[0]
+    count = joint.sum(axis=1)
+    median = np.argmax(np.cumsum(joint, axis=1) >= count[:, None] / 2, axis=1)
+    dark = np.arange(LEVELS) < LEVELS // 4
+    still = dark & (count > 1e-3 * count.sum()) & (median <= np.arange(LEVELS))
+    return int(np.flatnonzero(still).max(initial=0))
+
+
+def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
+    """Log inverse response of one channel by least squares (equation 3 with the weights of equation 4).
+
+    Z : (N, P) integers 0..255, values of N pixels in P photographs
+    B : (P,) float, log exposure times, ln seconds
+    lam : smoothness, lambda in the paper; larger is smoother
+    w : (256,) float, weight of each pixel value
+
+    Returns g, (256,) float64 with g[128] = 0, the log exposure of each pixel value; and log_E, (N,)
+    float64, the log irradiance of each pixel, NaN where all its values have weight 0.
+    Raises ValueError where shapes or values don't fit.
+    """
+    Z, B, w = np.asarray(Z), np.asarray(B, dtype=np.float64), np.asarray(w, dtype=np.float64)
+    if Z.ndim != 2 or B.shape != Z.shape[1:]:
+        raise ValueError(f"Z must be (N, P) and B (P,), one log time for each column; got {Z.shape}, {B.shape}.")
+    if not np.issubdtype(Z.dtype, np.integer) or Z.min() < 0 or Z.max() >= LEVELS:
+        raise ValueError(f"Z must hold integers in 0..{LEVELS - 1}; got {Z.dtype} in {Z.min()}..{Z.max()}.")
+    if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
+        raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+    if not lam > 0:
+        raise ValueError(f"lam must be positive; got {lam}.")
+    if not np.all(np.isfinite(B)) or np.ptp(B) == 0:
+        raise ValueError("B must be finite and hold at least two different log exposure times.")
+    return _solve_reduced(Z.astype(np.intp), B, lam, w)
+
+
+def _solve_reduced(Z, B, lam, w):
+    """Normal equations of g after every log irradiance has been eliminated.
+
+    With W_ij = w(Z_ij)^2 and a_i = sum_j W_ij, the best ln E_i is sum_j W_ij (g(Z_ij) - B_j) / a_i. What is
+    left of pixel i's data term is a sum over pairs of photographs of
+    W_ij W_ik / a_i ((g(Z_ij) - g(Z_ik)) - (B_j - B_k))^2:
+    a graph on the 256 values whose edges say how far apart two values of g should be.
+    """
+    n_photos = Z.shape[1]
+    W = w[Z] ** 2
+    total = W.sum(axis=1)
+    share = np.divide(W, total[:, None], out=np.zeros_like(W), where=total[:, None] > 0)
+
+    edges = np.zeros(LEVELS * LEVELS)  # [u, v]: how strongly values u and v are tied
+    pull = np.zeros(LEVELS)  # how far the times push each value of g up
+    for j in range(n_photos):
+        for k in range(j + 1, n_photos):
+            weight = W[:, j] * share[:, k]
+            edges += np.bincount(Z[:, j] * LEVELS + Z[:, k], weight, LEVELS * LEVELS)
+            step = weight * (B[j] - B[k])
+            pull += np.bincount(Z[:, j], step, LEVELS) - np.bincount(Z[:, k], step, LEVELS)
+    edges = edges.reshape(LEVELS, LEVELS)
+    edges = edges + edges.T
+    np.fill_diagonal(edges, 0)
+
+    # Smoothness, equation 4: lam w(z) (g(z-1) - 2 g(z) + g(z+1)) for z = 1 .. 254, every one of them.
+    smooth = lam * np.maximum(w, FLOOR * w.max())[1:-1, None] * np.diff(np.eye(LEVELS), n=2, axis=0)
+    normal = np.diag(edges.sum(axis=1)) - edges + smooth.T @ smooth
+    normal[MIDDLE, MIDDLE] += normal.diagonal().max()  # the gauge row; its size does not change the answer
+
+    scale = 1 / np.sqrt(normal.diagonal())
+    factor = scipy.linalg.cho_factor(normal * scale[:, None] * scale)
+    g = scale * scipy.linalg.cho_solve(factor, scale * pull)
+    for _ in range(2):
+        # The normal equations lose half the digits. Residuals formed from differences of g, not from
+        # large sums, win them back.
+        residual = pull - (edges * (g[:, None] - g)).sum(axis=1) - smooth.T @ (smooth @ g)
+        g += scale * scipy.linalg.cho_solve(factor, scale * residual)
+    g -= g[MIDDLE]
+
+    log_E = np.where(total > 0, (share * (g[Z] - B)).sum(axis=1), np.nan)
+    return g, log_E
+
+
+def sample_pixels(images, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of n pixels spread over the picture and over its brightness.
+
+    images : P arrays (H, W, 3) uint8
+    Returns two (n,) integer arrays. Pixels are taken as points, never as averages: the response is not
+    linear, so the mean of some values is not the value of their mean. They are drawn evenly from the
+    pixels sorted by brightness, so that every pixel value is met; seeded, so that a run can be repeated.
+    Raises ValueError where there are fewer than n pixels.
+    """
+    height, width = images[0].shape[:2]
+    if n > height * width:
+        raise ValueError(f"{n} pixels were asked for; the photographs have {height * width}.")
+    # A grid of some ten times as many pixels is choice enough, and large photographs stay quick to sort.
+    stride = max(1, int(np.sqrt(height * width / (10 * n))))
+    # No single photograph tells the brightnesses of a high-range scene apart: their sum does.
+    brightness = np.sum([image[::stride, ::stride].sum(axis=2, dtype=np.int64) for image in images], axis=0)
+    rng = np.random.default_rng(seed)
+    order = np.lexsort((rng.random(brightness.size), brightness.ravel()))  # equal ones in random order
+    bins = np.linspace(0, brightness.size, n + 1).astype(int)
+    picked = order[rng.integers(bins[:-1], bins[1:])]
+    rows, cols = np.unravel_index(picked, brightness.shape)
+    return rows * stride, cols * stride
+
+
+def recover_crf(bracket: Bracket, lam: float = 50.0, n: int = 20_000, seed: int = 0) -> np.ndarray:
+    """The camera's log inverse response for red, green and blue.
+
+    bracket : Bracket with P >= 2 photographs
+    lam : smoothness as for a sample of 100 pixels; it is scaled with the sample, so that more pixels give
+        a surer curve and not a rougher one
+    n : how many pixels speak, at most
+    Returns crf, (3, 256) float64 with crf[:, 128] = 0; nowhere falling.
+    """
+    rows, cols = sample_pixels(bracket.images, min(n, bracket.images[0][..., 0].size), seed)
+    Z = np.stack([image[rows, cols] for image in bracket.images], axis=1)  # (N, P, 3)
+    w = fitted_weights(bracket.images)
+    curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
+    # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).
+    return np.maximum.accumulate(curves, axis=1)

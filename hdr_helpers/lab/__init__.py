@@ -1,0 +1,1 @@
+"""What surrounds the work: the virtual camera, measures against its truth, figures and explorers."""

@@ -1,0 +1,64 @@
+"""How far a result is from the truth. Light is counted in stops: log2, so that 1 is a factor of two."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class RadianceError:
+    """Error of a radiance map in stops, after one scale for each channel has been removed.
+
+    stops : (H, W, 3) float32, signed error, positive where the map is too bright; NaN where it has no
+        usable value
+    median, p95 : of the absolute error
+    """
+
+    stops: np.ndarray
+    median: float
+    p95: float
+
+
+def radiance_error(radiance, truth, where=None) -> RadianceError:
+    """Compare a radiance map with the truth.
+
+    radiance, truth : (H, W, 3) float, RGB
+    where : (H, W) bool, pixels that count; None counts all
+
+    Radiance is relative, and the gauge g[128] = 0 leaves each channel a scale of its own, so the median
+    error of each channel is taken off first.
+    """
+    radiance, truth = np.asarray(radiance, dtype=np.float32), np.asarray(truth, dtype=np.float32)
+    with np.errstate(all="ignore"):
+        stops = np.log2(radiance) - np.log2(truth)
+    stops[~np.isfinite(stops)] = np.nan
+    counted = stops if where is None else stops[where]
+    offset = np.nanmedian(counted.reshape(-1, 3), axis=0)
+    size = np.abs(counted - offset)
+    return RadianceError(stops - offset, float(np.nanmedian(size)), float(np.nanpercentile(size, 95)))
+
+
+def crf_rmse(crf, truth, low: int = 5, high: int = 250) -> np.ndarray:
+    """(3,) float64: root mean square error of log inverse responses in stops, over low <= z <= high.
+
+    crf, truth : (3, 256) natural logarithms. The gauge is removed: each error's mean is taken off.
+    """
+    error = (np.asarray(crf, dtype=np.float64) - truth)[:, low : high + 1] / np.log(2)
+    return np.sqrt(np.mean((error - error.mean(axis=1, keepdims=True)) ** 2, axis=1))
+
+
+def psnr_mu(radiance, truth, mu: float = 5000.0) -> float:
+    """PSNR in dB after mu-law compression, as in the NTIRE 2021 HDR challenge.
+
+    radiance, truth : (H, W, 3) float. One scale a channel is removed; the truth's 99th percentile is 1.
+    """
+    truth = np.asarray(truth, dtype=np.float64)
+    radiance = np.nan_to_num(np.asarray(radiance, dtype=np.float64), nan=0, posinf=0)
+    usable = radiance > 0
+    scale = [np.median((truth / np.where(usable, radiance, 1))[..., c][usable[..., c]]) for c in range(3)]
+    white = np.percentile(truth, 99)
+
+    def compress(light):
+        return np.log1p(mu * np.tanh(light / white)) / np.log1p(mu)
+
+    return float(-10 * np.log10(np.mean((compress(radiance * scale) - compress(truth)) ** 2)))
