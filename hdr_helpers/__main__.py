@@ -59,9 +59,7 @@ def _refuse_to_overwrite(out: Path, allowed: bool) -> None:
         raise FileExistsError(f"{out} is a file; give a folder to write to with -o.")
     there = [name for name in (RADIANCE, CURVE, PLOT, PICTURE) if (out / name).exists()]
     if there and not allowed:
-        raise FileExistsError(
-            f"{out} already holds {', '.join(there)}; give another folder with -o, or --overwrite."
-        )
+        raise FileExistsError(f"{out} already holds {', '.join(there)}; give another folder with -o, or --overwrite.")
 
 
 def _run(bracket: Bracket, out: Path, options) -> None:

@@ -59,8 +59,7 @@ def _as_seconds(source, values, brightness) -> tuple[np.ndarray, list[str]]:
     if agreement < 0:
         values = 1 / values
         notes.append(
-            f"{source[:1].upper()}{source[1:]} reads as 1/seconds: the photographs get darker as its "
-            "numbers grow."
+            f"{source[:1].upper()}{source[1:]} reads as 1/seconds: the photographs get darker as its numbers grow."
         )
     return values, notes
 

@@ -4,6 +4,7 @@ How exposure times are found and decided is in _times.py.
 """
 
 import io
+import itertools
 import re
 import zipfile
 from collections.abc import Callable
@@ -30,10 +31,12 @@ class Truth:
 
     radiance : (H, W, 3) float32, relative linear radiance behind the lens, RGB
     crf : (3, 256) float64, log inverse response of each channel, crf[:, 128] = 0
+    shifts : (P, 2) int, (dx, dy) pixels by which the hand moved each picture right and down, or None
     """
 
     radiance: np.ndarray
     crf: np.ndarray
+    shifts: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -71,9 +74,7 @@ class Bracket:
                     "all photographs of a bracket must have the same size."
                 )
         if not np.all(np.isfinite(times)) or times[0] <= 0 or np.any(np.diff(times) <= 0):
-            raise BracketError(
-                f"Exposure times must be positive and strictly ascending; got {times.tolist()} seconds."
-            )
+            raise BracketError(f"Exposure times must be positive and strictly ascending; got {times.tolist()} seconds.")
         object.__setattr__(self, "times", times)
 
     def __len__(self):
@@ -108,15 +109,13 @@ def load_bracket(path) -> Bracket:
     times, source, notes = find_times(path, names, texts, exif, brightness)
 
     order = np.argsort(times, kind="stable")
-    for a, b in zip(order, order[1:], strict=False):
+    for a, b in itertools.pairwise(order):
         if times[a] == times[b]:
             raise BracketError(
                 f"{names[a]} and {names[b]} have the same exposure time, {times[a]:g} s, by {source}; "
                 "keep one of them, or correct its time."
             )
-    return Bracket(
-        tuple(images[i] for i in order), times[order], tuple(names[i] for i in order), source, tuple(notes)
-    )
+    return Bracket(tuple(images[i] for i in order), times[order], tuple(names[i] for i in order), source, tuple(notes))
 
 
 # ---------------------------------------------------------------------------------------- files
@@ -135,9 +134,7 @@ def _zip_files(path: Path) -> dict[str, Callable[[], bytes]]:
     members = [m for m in archive.infolist() if not m.is_dir() and "__MACOSX" not in m.filename]
     total = sum(m.file_size for m in members)
     if total > MAX_BYTES:
-        raise BracketError(
-            f"{path} unpacks to {total / 2**30:.1f} GB; up to {MAX_BYTES / 2**30:.0f} GB are read."
-        )
+        raise BracketError(f"{path} unpacks to {total / 2**30:.1f} GB; up to {MAX_BYTES / 2**30:.0f} GB are read.")
     photographs = [PurePosixPath(m.filename).parent for m in members
                    if m.filename.lower().endswith(IMAGE_SUFFIXES)]  # fmt: skip
     home = max(photographs, key=photographs.count, default=PurePosixPath("."))

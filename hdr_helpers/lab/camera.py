@@ -10,6 +10,7 @@ makes the course's own bracket, data/chapel, from data/scenes/chapel.npz; the sa
 
 import argparse
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -104,7 +105,7 @@ class Camera:
             self.photograph(gain * t * shift_image(radiance, move)[inside], frame)
             for frame, (t, move) in enumerate(zip(times, moves, strict=True))
         ]
-        truth = Truth(np.asarray(radiance[inside], dtype=np.float32), self.crf())
+        truth = Truth(np.asarray(radiance[inside], dtype=np.float32), self.crf(), moves)
         names = tuple(f"frame_{frame:02d}" for frame in range(len(times)))
         return Bracket(tuple(images), np.array(times), names, "the virtual camera", (), truth)
 
@@ -153,6 +154,13 @@ def make_chapel(folder) -> None:
         listed.append(f"{name} {spelled}")
     write_whole(folder / "shutter.txt", ("\n".join(listed) + "\n").encode())
     save_truth(folder, bracket.truth, STORED_SCALE)
+
+
+@cache
+def handheld_chapel() -> Bracket:
+    """The chapel shot from the hand: shifts of up to 20 pixels between frames, with the truth."""
+    shifts = np.random.default_rng(4).integers(-20, 21, (len(CHAPEL_TIMES), 2))
+    return Camera().shoot(scene("chapel"), CHAPEL_TIMES, shifts)
 
 
 if __name__ == "__main__":

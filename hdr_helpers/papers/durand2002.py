@@ -39,20 +39,25 @@ def fast_bilateral(values, sigma_space: float, sigma_range: float = 0.4) -> np.n
     sigma_range : in the units of values; 0.4 in log10 is the paper's
 
     For a fixed centre value the bilateral filter is a ratio of two Gaussian blurs. It is computed for
-    centre values half a sigma_range apart, on a smaller picture, and interpolated to each pixel's own.
+    centre values half a sigma_range apart and interpolated to each pixel's own value. Blurs that wide lose
+    nothing when they are made on a smaller picture.
     """
-    small_sigma = min(sigma_space, 4.0)
     height, width = values.shape
-    small_size = (max(1, round(width * small_sigma / sigma_space)), max(1, round(height * small_sigma / sigma_space)))
-    small = cv2.resize(values, small_size, interpolation=cv2.INTER_NEAREST)
+    shrink = max(1.0, sigma_space / 4)
+    small = (max(1, round(width / shrink)), max(1, round(height / shrink)))
+
+    def blur(picture):
+        picture = cv2.resize(picture, small, interpolation=cv2.INTER_AREA)
+        return cv2.GaussianBlur(picture, (0, 0), sigma_space / shrink)
+
     low, high = float(values.min()), float(values.max())
-    centres = np.linspace(low, high, max(2, int(np.ceil((high - low) / (0.5 * sigma_range))) + 1))
-    step = centres[1] - centres[0]
+    centres = np.linspace(low, high, max(2, int(np.ceil((high - low) / (0.5 * sigma_range))) + 1), dtype=np.float32)
+    step = max(float(centres[1] - centres[0]), 1e-12)
     result = np.zeros_like(values)
     for centre in centres:
-        near = np.exp(-0.5 * ((small - centre) / sigma_range) ** 2).astype(np.float32)
-        blurred = cv2.GaussianBlur(near * small, (0, 0), small_sigma)
-        blurred /= np.maximum(cv2.GaussianBlur(near, (0, 0), small_sigma), np.float32(1e-10))
-        share = np.clip(1 - np.abs(values - np.float32(centre)) / max(step, 1e-12), 0, 1).astype(np.float32)
+        offset = values - centre
+        near = cv2.exp(offset**2 * np.float32(-0.5 / sigma_range**2))
+        blurred = centre + blur(near * offset) / np.maximum(blur(near), np.float32(1e-12))
+        share = np.maximum(1 - np.abs(offset) / np.float32(step), 0)
         result += share * cv2.resize(blurred, (width, height), interpolation=cv2.INTER_LINEAR)
     return result

@@ -1,0 +1,132 @@
+"""Explorers: pictures with sliders. Each has a static figure beside it in its notebook.
+
+Every explorer draws into one Image widget, so nothing stacks up or flickers when a slider moves.
+"""
+
+import cv2
+import ipywidgets as widgets
+import numpy as np
+
+from hdr_helpers.align import align_mtb, bitmaps
+from hdr_helpers.crf import fitted_weights, gsolve, sample_pixels
+from hdr_helpers.lab.figures import (
+    data_on_curve_figure,
+    hand_figure,
+    histogram_figure,
+    jpeg_bytes,
+    seconds,
+    viewed_at,
+)
+from hdr_helpers.lab.metrics import crf_rmse
+from hdr_helpers.tonemap import expose_for_screen, tonemap
+
+PREVIEW = 480  # pixels across in explorers that compute while a slider moves
+CONTROL = {"style": {"description_width": "190px"}, "layout": {"width": "560px"}}
+
+
+def _explorer(draw, controls: dict, extra=()):
+    """Controls above a picture. draw(**values) returns JPEG bytes, or JPEG bytes and a line of text."""
+    image, line = widgets.Image(format="jpeg"), widgets.HTML()
+
+    def redraw(_=None):
+        drawn = draw(**{name: control.value for name, control in controls.items()})
+        image.value, line.value = drawn if isinstance(drawn, tuple) else (drawn, "")
+
+    for control in controls.values():
+        control.observe(redraw, names="value")
+    redraw()
+    return widgets.VBox([*controls.values(), *extra, line, image])
+
+
+def exposure_explorer(bracket):
+    """One photograph of the bracket at a time, its unusable pixels striped, with its histogram."""
+    drawn = {t: jpeg_bytes(histogram_figure(i, t)) for i, t in zip(bracket.images, bracket.times, strict=True)}
+    options = [(seconds(t), t) for t in bracket.times]
+    slider = widgets.SelectionSlider(
+        options=options, value=bracket.times[len(options) // 2], description="exposure time", **CONTROL
+    )
+    return _explorer(lambda time: drawn[time], {"time": slider})
+
+
+def align_explorer(fixed, moving, reach=24):
+    """Align two photographs, (H, W, 3) uint8, by hand: bring the coloured pixels of their bitmaps to vanish."""
+    fixed_bits, moving_bits = (bitmaps(cv2.cvtColor(i, cv2.COLOR_RGB2GRAY)) for i in (fixed, moving))
+    right = widgets.IntSlider(0, -reach, reach, description="right (px)", **CONTROL)
+    down = widgets.IntSlider(0, -reach, reach, description="down (px)", **CONTROL)
+    button = widgets.Button(description="Let MTB do it", tooltip="set both sliders to the shift that MTB finds")
+
+    def draw(dx, dy):
+        picture = hand_figure(fixed_bits, moving_bits, (dx, dy))
+        coloured = (picture[..., 0] != picture[..., 2]).mean()
+        return jpeg_bytes(picture), f"<b>{coloured:.2%}</b> of the pixels disagree at ({dx:+d}, {dy:+d})"
+
+    def solve(_):
+        right.value, down.value = (int(s) for s in align_mtb([moving, fixed]).shifts[0])
+
+    button.on_click(solve)
+    return _explorer(draw, {"dx": right, "dy": down}, [button])
+
+
+def crf_explorer(bracket, channel=1):
+    """The response curve from few or many samples, rough or smooth, with some exposures left out."""
+    lam = widgets.FloatLogSlider(50, base=10, min=-1, max=4, step=0.25, description="smoothness (lambda)", **CONTROL)
+    n = widgets.SelectionSlider(
+        options=[5, 10, 20, 50, 100, 200, 500, 1000], value=50, description="samples (N)", **CONTROL
+    )
+    every = widgets.SelectionSlider(
+        options=[("every photograph", 1), ("every second", 2), ("every fourth", 4)],
+        value=1, description="exposures", **CONTROL,
+    )  # fmt: skip
+
+    def draw(lam, n, every):
+        images, B = bracket.images[::every], bracket.log_times[::every]
+        rows, cols = sample_pixels(images, n)
+        Z = np.stack([image[rows, cols, channel] for image in images], axis=1)
+        g, log_E = gsolve(Z, B, lam, fitted_weights(images))
+        title = f"{n} samples in {len(images)} photographs, lambda {lam:.3g}"
+        picture = jpeg_bytes(data_on_curve_figure(Z, B, g, log_E, title))
+        if bracket.truth is None:
+            return picture
+        error = crf_rmse(g[None], bracket.truth.crf[channel][None])[0]
+        return picture, f"error against the truth: <b>{error:.3f} stops</b> (RMS over values 5 to 250)"
+
+    return _explorer(draw, {"lam": lam, "n": n, "every": every})
+
+
+def radiance_explorer(radiance):
+    """A radiance map behind an exposure slider, as a photograph taken afterwards would show it."""
+    stops = widgets.FloatSlider(0, min=-12, max=6, step=0.5, description="exposure (stops)", **CONTROL)
+    return _explorer(lambda stops: jpeg_bytes(viewed_at(radiance, stops)), {"stops": stops})
+
+
+def tonemap_explorer(radiance):
+    """The operators and the parameters they have in common, on a small copy of the radiance map."""
+    height, width = radiance.shape[:2]
+    size = (PREVIEW, round(PREVIEW * height / width))
+    small = expose_for_screen(cv2.resize(radiance, size, interpolation=cv2.INTER_AREA))
+    operator = widgets.Dropdown(
+        options=["gamma", "reinhard", "drago", "mantiuk", "durand"],
+        value="reinhard",
+        description="operator",
+        **CONTROL,
+    )
+    gamma = widgets.FloatSlider(2.2, min=1, max=4, step=0.1, description="gamma (all)", **CONTROL)
+    saturation = widgets.FloatSlider(
+        1.0, min=0, max=1.5, step=0.05, description="saturation (drago, mantiuk, durand)", **CONTROL
+    )
+    intensity = widgets.FloatSlider(0, min=-8, max=8, step=0.5, description="intensity (reinhard)", **CONTROL)
+    light = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="light_adapt (reinhard)", **CONTROL)
+    colour = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="color_adapt (reinhard)", **CONTROL)
+
+    def draw(operator, gamma, saturation, intensity, light, colour):
+        own = {
+            "gamma": {},
+            "reinhard": {"intensity": intensity, "light_adapt": light, "color_adapt": colour},
+        }.get(operator, {"saturation": saturation})
+        return jpeg_bytes(tonemap(small, operator, gamma=gamma, **own))
+
+    controls = {
+        "operator": operator, "gamma": gamma, "saturation": saturation,
+        "intensity": intensity, "light": light, "colour": colour,
+    }  # fmt: skip
+    return _explorer(draw, controls)

@@ -1,0 +1,60 @@
+"""Figures of the course, one file for each stage and one for the style they share.
+
+Functions named *_figure return a matplotlib Figure; show() puts one into a notebook with its alt text.
+"""
+
+from hdr_helpers.lab.figures.align import bitmaps_figure, detail_figure, hand_figure, shifts_figure
+from hdr_helpers.lab.figures.crf import (
+    crf_error_figure,
+    crf_figure,
+    data_on_curve_figure,
+    doubling_figure,
+    matrix_figure,
+    sampling_figure,
+)
+from hdr_helpers.lab.figures.load import (
+    clipping_overlay,
+    histogram_figure,
+    one_photo_figure,
+    pixel_figure,
+    strip_figure,
+)
+from hdr_helpers.lab.figures.merge import (
+    error_figure,
+    false_colour_figure,
+    honest_figure,
+    pixel_estimates_figure,
+    viewed_at,
+)
+from hdr_helpers.lab.figures.style import jpeg_bytes, pictures_figure, png_bytes, seconds, show
+from hdr_helpers.lab.figures.tonemap import curve_figure, eight_bits_figure
+
+__all__ = [
+    "bitmaps_figure",
+    "clipping_overlay",
+    "crf_error_figure",
+    "crf_figure",
+    "curve_figure",
+    "data_on_curve_figure",
+    "detail_figure",
+    "doubling_figure",
+    "eight_bits_figure",
+    "error_figure",
+    "false_colour_figure",
+    "hand_figure",
+    "histogram_figure",
+    "honest_figure",
+    "jpeg_bytes",
+    "matrix_figure",
+    "one_photo_figure",
+    "pictures_figure",
+    "pixel_estimates_figure",
+    "pixel_figure",
+    "png_bytes",
+    "sampling_figure",
+    "seconds",
+    "shifts_figure",
+    "show",
+    "strip_figure",
+    "viewed_at",
+]

@@ -1,0 +1,154 @@
+"""Figures of stage 3: the response curve, the matrix, the data on the curve."""
+
+import numpy as np
+from matplotlib.patches import Rectangle
+
+from hdr_helpers.lab.figures.style import (
+    ACCENT,
+    CHANNELS,
+    INK,
+    MUTED,
+    THREE,
+    bare,
+    headline,
+    new_figure,
+    plain,
+)
+
+
+def doubling_figure(bracket, point):
+    """Pixel value against exposure time for one pixel, beside what a linear camera would have recorded."""
+    row, col = point
+    values = np.array([image[row, col, 1] for image in bracket.images], dtype=float)
+    first = np.argmax(values > 20)
+    fig, ax = new_figure(1, 1, 3.4)
+    ax.plot(bracket.times, values, "o-", color=THREE[0][0], label="what this camera recorded")
+    linear = np.minimum(values[first] * bracket.times / bracket.times[first], 255)
+    ax.plot(bracket.times, linear, "^--", color=THREE[1][0], label="what a linear camera would have recorded")
+    ax.set(xscale="log", xlabel="exposure time (s)", ylabel="pixel value (green)", ylim=(0, 265))
+    ax.legend(frameon=False, loc="upper left")
+    plain(ax)
+    headline(fig, "Twice the light is not twice the pixel value")
+    return fig
+
+
+def sampling_figure(image, rows, cols):
+    """Where the samples lie in the picture."""
+    fig, (left, right) = new_figure(1, 2, 3.4, width_ratios=[1.4, 1])
+    bare(left)
+    left.imshow(image)
+    left.scatter(cols, rows, s=26, marker="o", facecolor="none", edgecolor="white", lw=2.2)
+    left.scatter(cols, rows, s=26, marker="o", facecolor="none", edgecolor=ACCENT, lw=1.2)
+    right.hist(image[rows, cols, 1], bins=np.arange(0, 257, 16), color=ACCENT, edgecolor=INK)
+    right.set(xlabel="pixel value (green) in this photograph", ylabel="samples")
+    plain(right)
+    headline(fig, f"{len(rows)} samples, spread over the picture and over its brightness")
+    return fig
+
+
+def matrix_figure(A, n_data):
+    """Where the matrix A of the least-squares problem is not zero, and what its blocks are.
+
+    A : (rows, 256 + N) with n_data data rows first, then the gauge row, then smoothness
+    """
+    fig, ax = new_figure(1, 1, 5.2)
+    rows, cols = np.nonzero(A)
+    ax.plot(cols, rows, ".", ms=2.2, color=INK, mec="none")
+    height, width = A.shape
+    for top, bottom, colour, text in (
+        (0, n_data, THREE[0][0], "data: one row for each sample in each photograph"),
+        (n_data, n_data + 1, ACCENT, "gauge: one row"),
+        (n_data + 1, height, THREE[1][0], "smoothness: 254 rows"),
+    ):
+        box = Rectangle((-0.5, top - 0.5), width, bottom - top, fill=False, ec=colour, lw=1.8)
+        ax.add_patch(box)
+        ax.annotate(text, (width, (top + bottom) / 2), (8, 0), textcoords="offset points", va="center",
+                    color=colour, weight="bold", annotation_clip=False)  # fmt: skip
+    ax.axvline(255.5, color=MUTED, ls="--", lw=1)
+    ax.set(
+        xlim=(-1, width),
+        ylim=(height, -1),
+        ylabel="row",
+        xlabel="unknown: 256 values of g, then ln E of each sample",
+    )
+    headline(fig, f"A is {height} x {width}, and {100 * len(rows) / A.size:.2f}% of it is not zero")
+    return fig
+
+
+def data_on_curve_figure(Z, B, g, log_E, title="Measured points fall onto one curve"):
+    """Samples before and after their log irradiance is known, as in the paper's figure 2.
+
+    Z : (N, P), B : (P,), g : (256,), log_E : (N,)
+    """
+    fig, (left, right) = new_figure(1, 2, 3.6, sharex=True)
+    known = np.flatnonzero(np.isfinite(log_E))
+    few = known[np.argsort(Z[known].sum(axis=1))][:: max(1, len(known) // 12)]
+    for i, (colour, _, marker) in zip(few, THREE * len(few), strict=False):
+        left.plot(Z[i], B, marker + "-", ms=4, lw=0.8, color=colour)
+    right.plot(Z[known].ravel(), (log_E[known, None] + B).ravel(), ".", ms=2, color=MUTED, label="samples")
+    right.plot(np.arange(256), g, color=THREE[0][0], lw=2, label="g")
+    left.set(xlabel="pixel value Z", ylabel="ln dt")
+    right.set(xlabel="pixel value Z", ylabel="ln E + ln dt", ylim=(g.min() - 0.7, g.max() + 0.7))
+    left.set_title("each sample its own curve: E is unknown", fontsize=10)
+    right.set_title("shifted by its ln E: one curve", fontsize=10)
+    right.legend(frameon=False)
+    plain(left)
+    plain(right)
+    headline(fig, title)
+    return fig
+
+
+def crf_figure(crf, title="Response curve of the camera", **others):
+    """Log inverse response of three channels, and the same the other way round.
+
+    crf : (3, 256)
+    others : name -> (3, 256), drawn thin behind it after the free gauge of each curve has been removed
+    """
+    fig, (left, right) = new_figure(1, 2, 3.9)
+    z = np.arange(256)
+    for c, (name, colour, style, marker) in enumerate(CHANNELS):
+        for ax, flip in ((left, 1), (right, -1)):
+            ax.plot(
+                *(z, crf[c])[::flip],
+                color=colour,
+                ls=style,
+                marker=marker,
+                markevery=(8 + 12 * c, 48),
+                label=name,
+            )
+            for curve, ink in zip(others.values(), (INK, ACCENT), strict=False):
+                laid_over = curve[c] + np.median((crf[c] - curve[c])[40:220])
+                ax.plot(*(z, laid_over)[::flip], color=ink, lw=1.1, ls=(0, (1, 1.5)))
+    for name, ink in zip(others, (INK, ACCENT), strict=False):
+        left.plot([], [], color=ink, ls=(0, (1, 1.5)), label=name)
+    low, high = crf[:, 2].min() - 0.5, crf.max() + 0.5
+    left.set(xlabel="pixel value Z", ylabel="log exposure g(Z)", xlim=(0, 255), ylim=(low, high))
+    right.set(ylabel="pixel value Z", xlabel="log exposure ln(E dt)", ylim=(0, 255), xlim=(low, high))
+    left.set_title("inverse response: what a pixel value means", fontsize=10)
+    right.set_title("response: what the camera makes of light", fontsize=10)
+    left.legend(frameon=False)
+    plain(left)
+    plain(right)
+    headline(fig, title)
+    return fig
+
+
+def crf_error_figure(curves, truth, title):
+    """Error of log inverse responses in stops against the pixel value, a panel for each channel.
+
+    curves : name -> (3, 256); truth : (3, 256). The gauge, one constant a curve, is removed.
+    """
+    fig, axes = new_figure(1, 3, 3.4, sharey=True)
+    z = np.arange(5, 251)
+    for c, (ax, (name, *_)) in enumerate(zip(axes, CHANNELS, strict=True)):
+        for (who, curve), (colour, style, _) in zip(curves.items(), THREE, strict=False):
+            error = (curve[c, z] - truth[c, z]) / np.log(2)
+            ax.plot(z, error - error.mean(), style, color=colour, label=who)
+        ax.axhline(0, color=INK, lw=0.8)
+        ax.set(xlabel="pixel value Z", ylim=(-0.42, 0.42))
+        ax.set_title(name, fontsize=10)
+        plain(ax)
+    axes[0].set_ylabel("error of g (stops)")
+    axes[0].legend(frameon=False, loc="lower center")
+    headline(fig, title)
+    return fig

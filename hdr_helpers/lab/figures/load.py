@@ -1,0 +1,103 @@
+"""Figures of stage 1: exposures, histograms, clipping, what one photograph knows."""
+
+import cv2
+import numpy as np
+from matplotlib import patheffects
+
+from hdr_helpers.lab.figures.style import (
+    BRIGHT_MARK,
+    CHANNELS,
+    DARK_MARK,
+    INK,
+    THREE,
+    bare,
+    headline,
+    new_figure,
+    pictures_figure,
+    plain,
+    seconds,
+)
+from hdr_helpers.lab.metrics import radiance_error
+
+TOO_DARK, TOO_BRIGHT = 3, 250  # pixel values below and from which a JPEG says nothing to rely on
+
+
+def strip_figure(bracket, title=None, cols=5):
+    """All photographs of a bracket as a contact sheet."""
+    small = [cv2.resize(i, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for i in bracket.images]
+    return pictures_figure(small, [seconds(t) for t in bracket.times], cols, title)
+
+
+def clipping_overlay(image):
+    """A photograph, (H, W, 3) uint8, with rising stripes where it is too bright, falling where too dark."""
+    rows, cols = np.indices(image.shape[:2])
+    marked = image.copy()
+    bright, dark = (image >= TOO_BRIGHT).any(axis=2), (image < TOO_DARK).any(axis=2)
+    marked[bright & ((rows + cols) % 8 < 4)] = (230, 159, 0)
+    marked[dark & ((rows - cols) % 8 < 4)] = (0, 114, 178)
+    return marked
+
+
+def histogram_figure(image, time):
+    """A photograph with its unusable pixels striped, beside its histograms."""
+    fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.4, 1])
+    bare(left)
+    left.imshow(clipping_overlay(image))
+    left.set_title("striped: too dark (blue) or too bright (orange)", fontsize=10)
+    for c, (name, colour, style, _) in enumerate(CHANNELS):
+        count = np.bincount(image[..., c].ravel(), minlength=256)
+        right.plot(count / count.sum() * 100, color=colour, ls=style, label=name)
+    right.axvspan(0, TOO_DARK, color=DARK_MARK, alpha=0.25)
+    right.axvspan(TOO_BRIGHT, 255, color=BRIGHT_MARK, alpha=0.35)
+    right.set(xlabel="pixel value", ylabel="share of pixels (%)", ylim=(0.01, 100), yscale="log", xlim=(0, 255))
+    right.legend(frameon=False, loc="upper center")
+    usable = ((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2).mean()
+    right.set_title(f"{usable:.0%} of the pixels usable", fontsize=10)
+    plain(right)
+    headline(fig, f"exposure time {seconds(time)}")
+    return fig
+
+
+def pixel_figure(bracket, points):
+    """Three pixels followed through all exposures. points : name -> (row, column)"""
+    fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.3, 1])
+    bare(left)
+    left.imshow(bracket.images[len(bracket) // 2 + 1])
+    for (name, (row, col)), (colour, style, marker) in zip(points.items(), THREE, strict=True):
+        left.plot(col, row, marker, ms=11, mfc="none", mec="white", mew=4)
+        left.plot(col, row, marker, ms=11, mfc="none", mec=colour, mew=2)
+        label = left.annotate(name, (col, row), (10, 8), textcoords="offset points", color="white", weight="bold")
+        label.set_path_effects([patheffects.withStroke(linewidth=3, foreground=INK)])
+        values = [image[row, col, 1] for image in bracket.images]
+        right.plot(bracket.times, values, marker + style, color=colour, label=name)
+    right.set(xscale="log", xlabel="exposure time (s)", ylabel="pixel value (green)", ylim=(-5, 262))
+    right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
+    plain(right)
+    headline(fig, "No single exposure measures all three pixels")
+    return fig
+
+
+def one_photo_figure(bracket):
+    """How much of the scene each photograph alone gets right, against the truth of a virtual camera."""
+    usable, wrong = [], []
+    for image, time in zip(bracket.images, bracket.times, strict=True):
+        inside = ((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2)
+        guess = np.maximum(image / np.float32(255), 1 / 512) ** 2.2 / time
+        usable.append(100 * inside.mean())
+        wrong.append(radiance_error(guess, bracket.truth.radiance).p95)
+    fig, (left, right) = new_figure(1, 2, 3.2)
+    labels = [seconds(t) for t in bracket.times]
+    for ax, values, colour, unit in (
+        (left, usable, DARK_MARK, "%.0f%%"),
+        (right, wrong, BRIGHT_MARK, "%.1f"),
+    ):
+        ax.bar_label(ax.bar(labels, values, color=colour, edgecolor=INK), fmt=unit, fontsize=9)
+        ax.tick_params(axis="x", rotation=45)
+        plain(ax)
+        ax.grid(False)
+    left.set(ylabel="usable pixels (%)", ylim=(0, 105))
+    right.set(ylabel="error, 95th percentile (stops)")
+    left.set_title("what each photograph holds", fontsize=10)
+    right.set_title("how wrong it is when taken for the whole scene", fontsize=10)
+    headline(fig, "Every photograph alone is stops away from the truth")
+    return fig
