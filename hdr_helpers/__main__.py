@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--out", type=Path, help="folder to write to (default: BRACKET's name and _hdr)")
     parser.add_argument("--overwrite", action="store_true", help="replace results of an earlier run in OUT")
     parser.add_argument("--no-align", action="store_true", help="the photographs lie on each other already")
-    parser.add_argument("--lam", type=float, default=50.0, help="smoothness of the curve (default: %(default)g)")
+    parser.add_argument("--lam", type=float, default=20.0, help="smoothness of the curve (default: %(default)g)")
     parser.add_argument(
         "--tonemap", choices=sorted(OPERATORS), default="durand", help="operator (default: %(default)s)"
     )

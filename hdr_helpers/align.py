@@ -72,8 +72,8 @@ def align_mtb(images, max_shift: int = 64) -> Alignment:
 def shift_image(image, shift) -> np.ndarray:
     """Move an image (H, W) or (H, W, 3) by (dx, dy) whole pixels right and down; what moves in is 0.
 
-    Zero has no weight when the response is recovered and when exposures are merged, so the empty border
-    does no harm there. (np.roll would bring in the opposite edge instead.)
+    The empty border holds no measurement: 0 has no weight in the merge, and crop_common cuts it off.
+    (np.roll would bring in the opposite edge instead.)
     """
     dx, dy = (int(s) for s in shift)
     height, width = image.shape[:2]

@@ -9,6 +9,7 @@ weighted mean, and putting that mean back leaves a problem in the 256 values of 
 however many pixels there are. That is how gsolve works; the matrix of the paper's appendix is never built.
 """
 
+import cv2
 import numpy as np
 import scipy.linalg
 
@@ -16,6 +17,8 @@ from hdr_helpers.load import Bracket
 
 LEVELS = 256
 MIDDLE = 128  # g[MIDDLE] = 0 fixes the gauge: equation 3 leaves g free up to a constant
+NOISE = 4  # up to here a pixel value is more noise and rounding than light, whatever the black level
+RINGING = 20  # grey levels by which JPEG pulls a clipped pixel below white where white ends
 CLIPPED = 250  # from here on a pixel value may be a clipped one, pulled down by noise or JPEG
 FLOOR = 1e-4  # least weight of a smoothness row, so that values that no weight reaches stay defined
 
@@ -38,7 +41,7 @@ def fitted_weights(images) -> np.ndarray:
 
     images : P arrays (H, W, 3) uint8, shortest exposure first
     """
-    return hat_weights(black_level(images), CLIPPED)
+    return hat_weights(max(black_level(images), NOISE), CLIPPED)
 
 
 def black_level(images) -> int:
@@ -55,6 +58,16 @@ def black_level(images) -> int:
     dark = np.arange(LEVELS) < LEVELS // 4
     still = dark & (count > 1e-3 * count.sum()) & (median <= np.arange(LEVELS))
     return int(np.flatnonzero(still).max(initial=0))
+
+
+def whole_white(image) -> np.ndarray:
+    """A photograph, (H, W, 3) uint8, in which what is almost white and touches white is white.
+
+    A clipped area in a JPEG is not all 255: here and there it reads 245, which would pass for a measurement.
+    In a long exposure such a pixel says of the sun that it is as dim as a wall, so it must not have a vote.
+    """
+    touches_white = cv2.dilate(image, np.ones((3, 3), np.uint8)) >= CLIPPED
+    return np.where(touches_white & (image >= CLIPPED - RINGING), np.uint8(LEVELS - 1), image)
 
 
 def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +164,7 @@ def sample_pixels(images, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
     return rows * stride, cols * stride
 
 
-def recover_crf(bracket: Bracket, lam: float = 50.0, n: int = 20_000, seed: int = 0) -> np.ndarray:
+def recover_crf(bracket: Bracket, lam: float = 20.0, n: int = 20_000, seed: int = 0) -> np.ndarray:
     """The camera's log inverse response for red, green and blue.
 
     bracket : Bracket with P >= 2 photographs
@@ -160,9 +173,10 @@ def recover_crf(bracket: Bracket, lam: float = 50.0, n: int = 20_000, seed: int 
     n : how many pixels speak, at most
     Returns crf, (3, 256) float64 with crf[:, 128] = 0; nowhere falling.
     """
-    rows, cols = sample_pixels(bracket.images, min(n, bracket.images[0][..., 0].size), seed)
-    Z = np.stack([image[rows, cols] for image in bracket.images], axis=1)  # (N, P, 3)
-    w = fitted_weights(bracket.images)
+    images = [whole_white(image) for image in bracket.images]
+    rows, cols = sample_pixels(images, min(n, images[0][..., 0].size), seed)
+    Z = np.stack([image[rows, cols] for image in images], axis=1)  # (N, P, 3)
+    w = fitted_weights(images)
     curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
     # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).
     return np.maximum.accumulate(curves, axis=1)

@@ -14,11 +14,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hdr_helpers.crf import CLIPPED, LEVELS, fitted_weights
+from hdr_helpers.crf import LEVELS, fitted_weights, whole_white
 
 LAST_RESORT = 1e-5  # of the largest weight: decides only where no photograph has any other weight
 LEAST = 1e-9  # of the largest weight: no sum of weights is 0, whatever the values
-RINGING = 20  # grey levels by which JPEG pulls a clipped pixel below white where white ends
 TILE_ROWS = 64  # rows merged at a time: the working arrays stay in the processor's cache
 
 
@@ -75,16 +74,6 @@ def merge_debevec(images, times, crf, w=None) -> np.ndarray:
     if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
         raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
     return _merge_by_tables([whole_white(image) for image in images], *_tables(times, crf, w))
-
-
-def whole_white(image) -> np.ndarray:
-    """A photograph, (H, W, 3) uint8, in which what is almost white and touches white is white.
-
-    A clipped area in a JPEG is not all 255: here and there it reads 245, which would pass for a measurement.
-    In a long exposure such a pixel says of the sun that it is as dim as a wall, so it must not have a vote.
-    """
-    touches_white = cv2.dilate(image, np.ones((3, 3), np.uint8)) >= CLIPPED
-    return np.where(touches_white & (image >= CLIPPED - RINGING), np.uint8(LEVELS - 1), image)
 
 
 def _tables(times, crf, w) -> tuple[np.ndarray, np.ndarray]:

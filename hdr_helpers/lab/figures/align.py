@@ -7,7 +7,7 @@ from hdr_helpers.align import bitmaps
 from hdr_helpers.lab.figures.style import INK, THREE, headline, new_figure, pictures_figure, plain, seconds
 
 
-def detail_figure(pictures, titles, detail, title=None, scale=4):
+def detail_figure(pictures, titles, detail, title=None, cols=None, scale=4):
     """The same detail of several pictures, enlarged. detail : (top, left, height, width) in pixels"""
     top, left, height, width = detail
     crops = [p[top : top + height, left : left + width] for p in pictures]
@@ -15,7 +15,7 @@ def detail_figure(pictures, titles, detail, title=None, scale=4):
         cv2.resize(np.ascontiguousarray(c), None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC) for c in crops
     ]
     large = [np.clip(c, 0, 1) if c.dtype != np.uint8 else c for c in large]
-    return pictures_figure(large, titles, title=title)
+    return pictures_figure(large, titles, cols, title)
 
 
 def bitmaps_figure(images, times):

@@ -11,8 +11,10 @@ def eight_bits_figure(radiance):
     stops = np.log2(np.maximum(luminance(radiance), 1e-12) / np.median(luminance(radiance)))
     fig, ax = new_figure(1, 1, 3.0)
     ax.hist(stops.ravel(), bins=np.arange(-10, 16, 0.25), color=THREE[1][0], alpha=0.8, density=True)
+    top = ax.get_ylim()[1]
+    ax.set_ylim(0, 1.2 * top)
     ax.axvspan(-5.5, 2.5, color=THREE[0][0], alpha=0.3)
-    ax.annotate("8 stops: about what a screen shows", (-1.5, ax.get_ylim()[1] * 0.93), ha="center", color=INK)
+    ax.annotate("8 stops: about what a screen shows", (-1.5, 1.08 * top), ha="center", color=INK)
     ax.set(xlabel="stops above the median luminance", ylabel="share of pixels")
     plain(ax)
     headline(fig, "The scene is more than twice as wide as the screen")
