@@ -20,13 +20,15 @@ from hdr_helpers.lab.figures import (
 from hdr_helpers.lab.metrics import crf_rmse
 from hdr_helpers.tonemap import expose_for_screen, tonemap
 
-PREVIEW = 480  # pixels across in explorers that compute while a slider moves
+PREVIEW = 640  # pixels across in explorers that compute while a slider moves
 CONTROL = {"style": {"description_width": "190px"}, "layout": {"width": "560px"}}
 
 
 def _explorer(draw, controls: dict, extra=()):
     """Controls above a picture. draw(**values) returns JPEG bytes, or JPEG bytes and a line of text."""
-    image, line = widgets.Image(format="jpeg"), widgets.HTML()
+    # At its own size: a VBox would stretch it to the width of the page.
+    image = widgets.Image(format="jpeg", layout={"align_self": "flex-start", "max_width": "100%"})
+    line = widgets.HTML()
 
     def redraw(_=None):
         drawn = draw(**{name: control.value for name, control in controls.items()})
@@ -118,15 +120,17 @@ def tonemap_explorer(radiance):
     light = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="light_adapt (reinhard)", **CONTROL)
     colour = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="color_adapt (reinhard)", **CONTROL)
 
-    def draw(operator, gamma, saturation, intensity, light, colour):
-        own = {
-            "gamma": {},
-            "reinhard": {"intensity": intensity, "light_adapt": light, "color_adapt": colour},
-        }.get(operator, {"saturation": saturation})
-        return jpeg_bytes(tonemap(small, operator, gamma=gamma, **own))
+    uses = {  # beside gamma, which all of them have
+        "gamma": {},
+        "reinhard": {"intensity": intensity, "light_adapt": light, "color_adapt": colour},
+        **{name: {"saturation": saturation} for name in ("drago", "mantiuk", "durand")},
+    }
 
-    controls = {
-        "operator": operator, "gamma": gamma, "saturation": saturation,
-        "intensity": intensity, "light": light, "colour": colour,
-    }  # fmt: skip
-    return _explorer(draw, controls)
+    def draw(operator, gamma, **_):
+        for control in (saturation, intensity, light, colour):
+            control.disabled = control not in uses[operator].values()
+        parameters = {name: control.value for name, control in uses[operator].items()}
+        return jpeg_bytes(tonemap(small, operator, gamma=gamma, **parameters))
+
+    controls = {"operator": operator, "gamma": gamma, "saturation": saturation}
+    return _explorer(draw, {**controls, "intensity": intensity, "light": light, "colour": colour})
