@@ -10,7 +10,7 @@ import numpy as np
 
 from hdr_helpers.align import align_mtb, crop_common
 from hdr_helpers.crf import recover_crf
-from hdr_helpers.load import Bracket, BracketError, load_bracket
+from hdr_helpers.load import Bracket, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
 from hdr_helpers.tonemap import OPERATORS, dynamic_range_stops, tonemap, write_picture
 
@@ -26,7 +26,7 @@ def main(arguments=None) -> int:
         started = time.perf_counter()
         bracket = load_bracket(options.bracket)
         _run(bracket, out, options)
-    except (BracketError, OSError) as problem:
+    except (ValueError, OSError) as problem:
         print(f"hdr_helpers: {problem}", file=sys.stderr)
         return 1
     print(f"\nDone in {time.perf_counter() - started:.1f} s. The picture is {out / PICTURE}")
@@ -47,11 +47,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--out", type=Path, help="folder to write to (default: BRACKET's name and _hdr)")
     parser.add_argument("--overwrite", action="store_true", help="replace results of an earlier run in OUT")
     parser.add_argument("--no-align", action="store_true", help="the photographs lie on each other already")
-    parser.add_argument("--lam", type=float, default=20.0, help="smoothness of the curve (default: %(default)g)")
+    parser.add_argument("--lam", type=_positive, default=20.0, help="smoothness of the curve (default: %(default)g)")
     parser.add_argument(
         "--tonemap", choices=sorted(OPERATORS), default="durand", help="operator (default: %(default)s)"
     )
     return parser
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
+    return value
 
 
 def _refuse_to_overwrite(out: Path, allowed: bool) -> None:

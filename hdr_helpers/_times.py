@@ -23,7 +23,10 @@ class BracketError(ValueError):
 
 def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, list[str]]:
     """Exposure times in the order of names, where they came from, and notes on what was decided."""
-    found = [(f"the text file {name}", _text_values(name, data, names)) for name, data in texts.items()]
+    lists = [(f"the text file {name}", _text_values(name, data, names)) for name, data in texts.items()]
+    lists = [(source, *entry) for source, entry in lists if entry]
+    found = [(source, values) for source, named, values in lists if named]  # a list of names is the surest
+    found += [(source, values) for source, named, values in lists if not named]
     found += [("the file names", _name_values(names)), ("EXIF", exif if all(exif) else None)]
     found = [(source, np.array(values, dtype=np.float64)) for source, values in found if values is not None]
     if not found:
@@ -64,12 +67,18 @@ def _as_seconds(source, values, brightness) -> tuple[np.ndarray, list[str]]:
     return values, notes
 
 
-def _text_values(name: str, data: bytes, names: list[str]) -> list[float] | None:
-    """One number for each photograph from a text file; None where the file does not list times."""
+def _text_values(name: str, data: bytes, names: list[str]) -> tuple[bool, list[float]] | None:
+    """Whether a text file names the photographs, and its number for each; None where it lists no times."""
     text = data.decode("utf-8-sig", errors="replace")
     rows = _json_rows(text) if name.lower().endswith(".json") else _line_rows(text)
-    named = {PurePosixPath(row[0]).stem.lower(): _number(row[1]) for row in rows
-             if len(row) > 1 and row[0].lower().endswith(IMAGE_SUFFIXES)}  # fmt: skip
+    stems = {PurePosixPath(n).stem.lower() for n in names}
+    named, bare = {}, []
+    for row in rows:
+        label, numbers = _split_row(row, stems)
+        if label:
+            named[label] = numbers[0] if numbers else None
+        else:
+            bare.append(numbers)
     if named:  # lists often name .ppm files where .png ones lie: the stem decides
         missing = [n for n in names if named.get(PurePosixPath(n).stem.lower()) is None]
         if missing:
@@ -77,25 +86,46 @@ def _text_values(name: str, data: bytes, names: list[str]) -> list[float] | None
                 f"{name} gives no exposure time for {missing[0]}; every photograph needs a line, "
                 f"as in: {missing[0]} 1/60"
             )
-        return [named[PurePosixPath(n).stem.lower()] for n in names]
-    numbers = [[v for v in map(_number, row) if v is not None] for row in rows]
-    flat = [v for row in numbers for v in row]
-    return next((row for row in [flat, *numbers] if len(row) == len(names)), None)
+        return True, [named[PurePosixPath(n).stem.lower()] for n in names]
+    if None in bare:  # words that are neither names nor numbers: this is no list of times
+        return None
+    flat = [v for row in bare for v in row]
+    values = next((row for row in [flat, *bare] if len(row) == len(names)), None)
+    return values and (False, values)
 
 
-def _line_rows(text: str) -> list[list[str]]:
-    lines = (line.split("#")[0].replace(",", " ") for line in text.splitlines())
-    return [line.split() for line in lines if line.strip() and "=" not in line]
+def _split_row(row: str, stems: set[str]) -> tuple[str | None, list[float] | None]:
+    """The stem of the photograph that a row names, and the row's numbers; None for each where there is none."""
+    end = re.search(rf"({'|'.join(map(re.escape, IMAGE_SUFFIXES))})(?=$|[\s,;\"'])", row, re.IGNORECASE)
+    if not end:
+        numbers = [_number(word) for word in re.split(r"[\s,;]+", row.strip())]
+        return None, None if None in numbers else numbers
+    # A name may hold blanks, and a time may stand before it: the longest ending that is a photograph's.
+    before = row[: end.end()]
+    starts = [0, *(m.end() for m in re.finditer(r"[\s,;\"']+", before))]
+    candidates = [(PurePosixPath(before[start:].replace("\\", "/")).stem.lower(), start) for start in starts]
+    label, start = next((c for c in candidates if c[0] in stems), candidates[-1])
+    words = re.split(r"[\s,;\"']+", row[end.end() :]) + re.split(r"[\s,;\"']+", before[:start])
+    return label, [v for v in map(_number, words) if v is not None]
 
 
-def _json_rows(text: str) -> list[list[str]]:
+def _line_rows(text: str) -> list[str]:
+    """Lines that may hold times: no comments, no settings, no headers of words alone."""
+    lines = (line.split("#")[0].strip() for line in text.splitlines())
+    return [line for line in lines if re.search(r"\d", line) and "=" not in line]
+
+
+def _json_rows(text: str) -> list[str]:
+    """A JSON object from names to times, a list of objects, or a list of numbers, as lines of text."""
     try:
         content = json.loads(text)
     except json.JSONDecodeError:
         return []
     if isinstance(content, dict):
-        return [[str(k), str(v)] for k, v in content.items()]
-    return [[str(v) for v in row.values()] for row in content if isinstance(row, dict)]
+        return [f"{name} {value}" for name, value in content.items()]
+    if not isinstance(content, list):
+        return []
+    return [" ".join(map(str, row.values())) if isinstance(row, dict) else str(row) for row in content]
 
 
 def _name_values(names: list[str]) -> list[float] | None:

@@ -41,7 +41,8 @@ def align_mtb(images, max_shift: int = 64) -> Alignment:
     """Shift the photographs of a bracket onto the middle one.
 
     images : P arrays (H, W, 3) uint8, RGB, in order of exposure
-    max_shift : the largest shift between neighbouring exposures that is looked for, in pixels
+    max_shift : the largest shift between neighbouring exposures that is looked for, in pixels; at most
+        half the picture
 
     Each photograph is compared with its neighbour in exposure, which looks most like it, and the shifts
     are added up along the chain. A pair that can't be trusted counts as not shifted and is reported.
@@ -61,7 +62,7 @@ def align_mtb(images, max_shift: int = 64) -> Alignment:
     for side in (range(reference + 1, len(images)), range(reference - 1, -1, -1)):
         neighbour = reference
         for k in side:
-            shift = _pair_shift(pyramids[neighbour], pyramids[k])
+            shift = _pair_shift(pyramids[neighbour], pyramids[k], max_shift)
             doubtful[k] = shift is None
             shifts[k] = shifts[neighbour] + (0 if shift is None else shift)
             neighbour = k
@@ -104,23 +105,25 @@ def bitmaps(gray, percentile: float = 50) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _pyramid(gray, max_shift: int) -> list[np.ndarray]:
-    """The picture at full size, half size, and so on: enough levels for one-pixel steps to reach max_shift."""
+    """The picture at full size, half size, and so on, until max_shift is a pixel or the picture gets small."""
     levels = [gray]
     while 2 ** len(levels) <= max_shift and min(levels[-1].shape) >= 2 * MIN_PIXELS:
         levels.append(cv2.resize(levels[-1], None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
     return levels
 
 
-def _pair_shift(fixed: list, moving: list) -> np.ndarray | None:
+def _pair_shift(fixed: list, moving: list, max_shift: int) -> np.ndarray | None:
     """(dx, dy) that brings moving onto fixed, by the first percentile that gives a match to be trusted."""
     for percentile in PERCENTILES:
         if _clear_share(fixed[0], moving[0], percentile) < MIN_CLEAR:
             continue
         shift, error = np.zeros(2, dtype=int), 1.0
         for level_fixed, level_moving in zip(fixed[::-1], moving[::-1], strict=True):
+            # The smallest level is searched as far as max_shift goes, the others by one pixel each way.
+            radius = 1 if level_fixed is not fixed[-1] else int(np.ceil(max_shift / 2 ** (len(fixed) - 1)))
             pair = bitmaps(level_fixed, percentile), bitmaps(level_moving, percentile)
-            shift, error = _best_step(*pair, 2 * shift)
-        if error <= MAX_ERROR:
+            shift, error = _best_step(*pair, 2 * shift, radius)
+        if error <= MAX_ERROR and abs(shift).max() <= max_shift:
             return shift
     return None
 
@@ -137,8 +140,8 @@ def _clear_share(a, b, percentile) -> float:
     return share
 
 
-def _best_step(fixed, moving, start) -> tuple[np.ndarray, float]:
-    """The shift within one pixel of start whose bitmaps differ least, and how much they differ.
+def _best_step(fixed, moving, start, radius) -> tuple[np.ndarray, float]:
+    """The shift within radius pixels of start whose bitmaps differ least, and how much they differ.
 
     Bitmaps are compared by XOR where neither excludes a pixel. 0 is a perfect match, 1 is chance.
     """
@@ -147,6 +150,8 @@ def _best_step(fixed, moving, start) -> tuple[np.ndarray, float]:
 
     def error(step):
         dx, dy = start + step
+        if abs(dx) > width // 2 or abs(dy) > height // 2:
+            return 1.0  # too little overlap to tell anything
         here = np.s_[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]
         there = np.s_[max(-dy, 0) : height + min(-dy, 0), max(-dx, 0) : width + min(-dx, 0)]
         clear = cv2.bitwise_and(clear_fixed[here], moving[1][there])
@@ -158,7 +163,8 @@ def _best_step(fixed, moving, start) -> tuple[np.ndarray, float]:
         )
         return differ / max(p * (1 - q) + q * (1 - p), 1e-9)
 
-    steps = [np.array((dx, dy)) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+    reach = range(-radius, radius + 1)
+    steps = [np.array((dx, dy)) for dy in reach for dx in reach]
     steps.sort(key=lambda step: abs(step).sum())  # of equals, the smallest step wins
     errors = [error(step) for step in steps]
     return start + steps[int(np.argmin(errors))], min(errors)

@@ -51,6 +51,8 @@ def black_level(images) -> int:
     It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
     nothing of the scene, yet each of the short exposures would say it with conviction.
     """
+    if len(images) < 2:
+        return 0
     shortest, longer = (image[::2, ::2] for image in images[:2])
     joint = np.histogram2d(shortest.ravel(), longer.ravel(), bins=LEVELS, range=((0, LEVELS), (0, LEVELS)))[0]
     count = joint.sum(axis=1)
@@ -83,7 +85,7 @@ def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
     Raises ValueError where shapes or values don't fit.
     """
     Z, B, w = np.asarray(Z), np.asarray(B, dtype=np.float64), np.asarray(w, dtype=np.float64)
-    if Z.ndim != 2 or B.shape != Z.shape[1:]:
+    if Z.ndim != 2 or not Z.size or B.shape != Z.shape[1:]:
         raise ValueError(f"Z must be (N, P) and B (P,), one log time for each column; got {Z.shape}, {B.shape}.")
     if not np.issubdtype(Z.dtype, np.integer) or Z.min() < 0 or Z.max() >= LEVELS:
         raise ValueError(f"Z must hold integers in 0..{LEVELS - 1}; got {Z.dtype} in {Z.min()}..{Z.max()}.")
@@ -120,6 +122,11 @@ def _solve_reduced(Z, B, lam, w):
     edges = edges.reshape(LEVELS, LEVELS)
     edges = edges + edges.T
     np.fill_diagonal(edges, 0)
+    if not edges.any():
+        raise ValueError(
+            "No pixel has two different usable values, so nothing ties one pixel value to another; "
+            "take photographs whose exposures overlap: one to three stops apart."
+        )
 
     # Smoothness, equation 4: lam w(z) (g(z-1) - 2 g(z) + g(z+1)) for z = 1 .. 254, every one of them.
     smooth = lam * np.maximum(w, FLOOR * w.max())[1:-1, None] * np.diff(np.eye(LEVELS), n=2, axis=0)
@@ -179,4 +186,5 @@ def recover_crf(bracket: Bracket, lam: float = 20.0, n: int = 20_000, seed: int 
     w = fitted_weights(images)
     curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
     # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).
-    return np.maximum.accumulate(curves, axis=1)
+    curves = np.maximum.accumulate(curves, axis=1)
+    return curves - curves[:, MIDDLE : MIDDLE + 1]

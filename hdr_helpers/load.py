@@ -7,6 +7,7 @@ import io
 import itertools
 import re
 import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -139,10 +140,19 @@ def _zip_files(path: Path) -> dict[str, Callable[[], bytes]]:
                    if m.filename.lower().endswith(IMAGE_SUFFIXES)]  # fmt: skip
     home = max(photographs, key=photographs.count, default=PurePosixPath("."))
     return {
-        p.name: lambda m=m: archive.read(m)
+        p.name: lambda m=m: _unpack(archive, m, path)
         for m in members
         if (p := PurePosixPath(m.filename)).parent == home and not p.name.startswith(".")
     }
+
+
+def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path) -> bytes:
+    try:
+        return archive.read(member)
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError) as problem:
+        raise BracketError(
+            f"{member.filename} can't be unpacked from {path} ({problem}); make the zip again, without a password."
+        ) from None
 
 
 def _decode(name: str, data: bytes) -> tuple[np.ndarray, float | None]:

@@ -70,10 +70,13 @@ def merge_debevec(images, times, crf, w=None) -> np.ndarray:
         raise ValueError(f"Exposure times must be positive seconds; got {times.tolist()}.")
     if crf.shape != (3, LEVELS) or not np.all(np.isfinite(crf)):
         raise ValueError(f"crf must be (3, {LEVELS}) and finite; got {crf.shape}.")
-    w = fitted_weights(images) if w is None else np.asarray(w, dtype=np.float64)
+    shortest_first = [images[i] for i in np.argsort(times)]
+    w = fitted_weights(shortest_first) if w is None else np.asarray(w, dtype=np.float64)
     if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
         raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
-    return _merge_by_tables([whole_white(image) for image in images], *_tables(times, crf, w))
+    # In the shortest exposure even a doubtful value is better than none: nothing sees more.
+    settled = [image if t == times.min() else whole_white(image) for image, t in zip(images, times, strict=True)]
+    return _merge_by_tables(settled, *_tables(times, crf, w))
 
 
 def _tables(times, crf, w) -> tuple[np.ndarray, np.ndarray]:

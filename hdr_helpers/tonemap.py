@@ -37,11 +37,18 @@ def tonemap(radiance, operator: str = "durand", **parameters) -> np.ndarray:
         infinite ones as the brightest finite value.
     operator : a name in OPERATORS; parameters are that operator's own
     Returns ldr, (H, W, 3) float32 in 0..1, RGB, gamma included. The same call gives the same picture.
-    Raises ValueError for an unknown operator.
+    Raises ValueError for an unknown operator, or one that can't work on a picture so small.
     """
     if operator not in OPERATORS:
         raise ValueError(f"Unknown operator {operator!r}; there are {', '.join(sorted(OPERATORS))}.")
-    ldr = OPERATORS[operator](expose_for_screen(radiance), **parameters)
+    scaled = expose_for_screen(radiance)
+    if scaled.min() == scaled.max():
+        return scaled  # nothing to compress; some of OpenCV's operators divide by the range
+    try:
+        ldr = OPERATORS[operator](scaled, **parameters)
+    except cv2.error as problem:
+        height, width = scaled.shape[:2]
+        raise ValueError(f"OpenCV's {operator} can't tone-map {width} x {height} pixels: {problem.err}") from None
     return np.clip(np.nan_to_num(ldr), 0, 1).astype(np.float32)
 
 

@@ -51,13 +51,15 @@ def fast_bilateral(values, sigma_space: float, sigma_range: float = 0.4) -> np.n
         return cv2.GaussianBlur(picture, (0, 0), sigma_space / shrink)
 
     low, high = float(values.min()), float(values.max())
+    if high - low < 1e-6 * sigma_range:
+        return values.copy()
     centres = np.linspace(low, high, max(2, int(np.ceil((high - low) / (0.5 * sigma_range))) + 1), dtype=np.float32)
-    step = max(float(centres[1] - centres[0]), 1e-12)
+    step = centres[1] - centres[0]
     result = np.zeros_like(values)
     for centre in centres:
         offset = values - centre
         near = cv2.exp(offset**2 * np.float32(-0.5 / sigma_range**2))
         blurred = centre + blur(near * offset) / np.maximum(blur(near), np.float32(1e-12))
-        share = np.maximum(1 - np.abs(offset) / np.float32(step), 0)
+        share = np.maximum(1 - np.abs(offset) / step, 0)
         result += share * cv2.resize(blurred, (width, height), interpolation=cv2.INTER_LINEAR)
     return result

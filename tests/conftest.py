@@ -1,0 +1,50 @@
+"""What several test files share."""
+
+from pathlib import Path
+
+import cv2
+import pytest
+
+from hdr_helpers.lab import data
+from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, scene
+
+REAL = Path(__file__).parents[2] / "shared" / "brackets"
+
+
+@pytest.fixture(scope="session")
+def chapel():
+    return data.chapel()
+
+
+@pytest.fixture(scope="session")
+def small_bracket():
+    """A part of the chapel, 160 x 120 pixels, at 1/400, 1/60, 1/10, 0.6 and 4 seconds; with its truth."""
+    return Camera(seed=3, jpeg_quality=None).shoot(scene("chapel")[100:220, 200:360], CHAPEL_TIMES[::2])
+
+
+@pytest.fixture
+def save(tmp_path, small_bracket):
+    """save(names, texts) writes the small bracket, shortest first, under these names; returns the folder."""
+
+    def save(names, texts=None, folder="photographs"):
+        folder = tmp_path / folder
+        folder.mkdir()
+        for name, image in zip(names, small_bracket.images, strict=False):
+            cv2.imwrite(str(folder / name), image[..., ::-1])
+        for name, text in (texts or {}).items():
+            (folder / name).write_text(text)
+        return folder
+
+    return save
+
+
+@pytest.fixture
+def real():
+    """real(name) is the folder of a bracket shot with a real camera."""
+
+    def real(name):
+        if not (REAL / name).is_dir():
+            pytest.skip(f"The real photographs of {name} are not part of this repository; {REAL} is absent.")
+        return REAL / name
+
+    return real

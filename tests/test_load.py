@@ -1,0 +1,309 @@
+"""Stage 1: exposure times from every source, and a sentence for everything that can't be used."""
+
+import json
+import struct
+import zipfile
+
+import cv2
+import numpy as np
+import pytest
+
+from hdr_helpers._times import exif_exposure_time
+from hdr_helpers.load import Bracket, BracketError, load_bracket
+
+NAMES = ("a_1.png", "a_2.png", "a_3.png", "a_4.png")
+TIMES = (1 / 400, 1 / 60, 1 / 10, 0.6)
+KNOWN = dict(zip(NAMES, TIMES, strict=True))
+LISTED = "".join(f"{name} {seconds}\n" for name, seconds in KNOWN.items())
+
+
+def exif_block(numerator, denominator, order, orientation=1):
+    """A TIFF header, Orientation in the first directory, ExposureTime in the Exif directory."""
+    mark = {"<": b"II", ">": b"MM"}[order]
+    first = struct.pack(order + "HHHIHHHHIII", 2, 0x0112, 3, 1, orientation, 0, 0x8769, 4, 1, 38, 0)
+    exif = struct.pack(order + "HHHIII", 1, 0x829A, 5, 1, 56, 0)
+    return mark + struct.pack(order + "HI", 42, 8) + first + exif + struct.pack(order + "II", numerator, denominator)
+
+
+def write_with_exif(path, image, exif):
+    kinds, blocks = [cv2.IMAGE_METADATA_EXIF], [np.frombuffer(exif, np.uint8)]
+    _, data = cv2.imencodeWithMetadata(path.suffix, np.ascontiguousarray(image[..., ::-1]), kinds, blocks)
+    path.write_bytes(data.tobytes())
+
+
+def zipped(folder, target, inside="", also=()):
+    with zipfile.ZipFile(target, "w") as archive:
+        for name in also:
+            archive.writestr(name, b"not a picture")
+        for path in folder.iterdir():
+            archive.write(path, inside + path.name)
+    return target
+
+
+def assert_same(a, b):
+    assert (a.names, a.source, a.notes) == (b.names, b.source, b.notes)
+    assert np.array_equal(a.times, b.times)
+    assert all(np.array_equal(x, y) for x, y in zip(a.images, b.images, strict=True))
+
+
+# ------------------------------------------------------------------------------- sources of times
+
+SPELLED = {
+    "one line of seconds and fractions": ("t.txt", "1/400 1/60 0.1 0.6"),
+    "one number a line": ("t.txt", "1/400\n1/60\n0.1\n0.6\n"),
+    "one line of 1/seconds": ("t.txt", "400 60 10 1.6666667"),
+    "names and seconds, in any order": ("t.txt", "# set\n" + "".join(LISTED.splitlines(keepends=True)[::-1])),
+    "names and 1/seconds": ("t.txt", "4\n# name 1/t\n" + "".join(f"{n} {1 / t}\n" for n, t in KNOWN.items())),
+    "names with another suffix": ("t.txt", LISTED.replace(".png", ".ppm")),
+    "names and seconds, with commas": ("t.csv", LISTED.replace(" ", ",")),
+    "a JSON object": ("t.json", json.dumps(KNOWN)),
+    "a JSON list": ("t.json", json.dumps([{"file": n, "seconds": t} for n, t in KNOWN.items()])),
+    "a JSON list, seconds first": ("t.json", json.dumps([{"t": t, "f": n} for n, t in KNOWN.items()][::-1])),
+    "seconds and names, in any order": ("t.txt", "0.6 a_4.png\n0.1 a_3.png\n1/400 a_1.png\n1/60 a_2.png\n"),
+}
+
+
+@pytest.mark.parametrize("text_file", SPELLED.values(), ids=SPELLED.keys())
+def test_a_text_file_gives_the_times(save, small_bracket, text_file):
+    bracket = load_bracket(save(NAMES, dict([text_file])))
+    np.testing.assert_allclose(bracket.times, TIMES, rtol=1e-6)
+    assert bracket.names == NAMES
+    assert text_file[0] in bracket.source
+    assert all(np.array_equal(a, b) for a, b in zip(bracket.images, small_bracket.images, strict=False))
+
+
+def test_a_list_of_names_with_blanks_gives_each_photograph_its_own_time(save):
+    names = [f"my photo ({i}).png" for i in (1, 2, 3, 4)]
+    lines = [f"{name} {seconds}\n" for name, seconds in zip(names, TIMES, strict=True)]
+    np.testing.assert_allclose(load_bracket(save(names, {"t.txt": "".join(lines[::-1])})).times, TIMES)
+
+
+def test_a_list_without_names_follows_the_natural_order_of_names(save, small_bracket):
+    bracket = load_bracket(save(("shot_1.png", "shot_2.png", "shot_10.png"), {"t.txt": "1/400 1/60 1/10"}))
+    assert bracket.names == ("shot_1.png", "shot_2.png", "shot_10.png")
+    assert np.array_equal(bracket.images[2], small_bracket.images[2])
+
+
+def test_stops_become_powers_of_two(save):
+    bracket = load_bracket(save(NAMES, {"ev.txt": "-3\n0\n2.5\n5\n"}))
+    np.testing.assert_allclose(bracket.times, [1 / 8, 1, 2**2.5, 32])
+    assert "EV" in bracket.notes[0]
+
+
+@pytest.mark.parametrize(
+    "names, times",
+    [
+        (("img_0.033.png", "img_0.25.png", "img_2.5.png", "img_15.png"), (0.033, 0.25, 2.5, 15)),
+        (("exp_1_1000.png", "exp_1_60.png", "exp_1_2.png", "exp_4_1.png"), (1 / 1000, 1 / 60, 1 / 2, 4)),
+    ],
+)
+def test_file_names_give_the_times(save, names, times):
+    bracket = load_bracket(save(names))
+    assert bracket.names == names  # img_15 after img_2.5, though it sorts before it
+    np.testing.assert_allclose(bracket.times, times)
+    assert "names" in bracket.source
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+@pytest.mark.parametrize("order", "<>")
+def test_exif_gives_the_times_in_both_byte_orders(tmp_path, small_bracket, order, suffix):
+    for i, denominator in enumerate((400, 60, 10)):
+        exif = exif_block(1, denominator, order)
+        write_with_exif(tmp_path / f"IMG_{i}{suffix}", small_bracket.images[i], exif)
+    bracket = load_bracket(tmp_path)
+    np.testing.assert_allclose(bracket.times, [1 / 400, 1 / 60, 1 / 10])
+    assert "EXIF" in bracket.source
+
+
+@pytest.mark.parametrize("cut", [0, 2, 7, 9, 30, 50, 60])
+def test_exif_cut_short_gives_no_time(cut):
+    block = exif_block(1, 3, "<")
+    assert exif_exposure_time(block) == 1 / 3
+    assert exif_exposure_time(block[:cut]) is None
+
+
+@pytest.mark.parametrize("fraction", [(0, 1), (1, 0), (0, 0)])
+def test_exif_without_a_positive_time_gives_none(fraction):
+    assert exif_exposure_time(exif_block(*fraction, ">")) is None
+
+
+def test_two_sources_that_disagree_are_noted_with_both_values(save):
+    bracket = load_bracket(save(("a_0.01.png", "a_0.1.png", "a_1.0.png"), {"t.txt": "0.01 0.25 1"}))
+    (note,) = bracket.notes
+    assert "a_0.1.png" in note
+    assert "0.25 s" in note and "0.1 s" in note
+    assert bracket.times[1] == 0.25
+
+
+def test_a_common_factor_between_two_sources_is_not_noted(save):
+    assert load_bracket(save(("a_0.01.png", "a_0.1.png", "a_1.0.png"), {"t.txt": "0.02 0.2 2"})).notes == ()
+
+
+@pytest.mark.parametrize("text", ["5", "null", '"a word"', "[1, 2]", "{", "{}"])
+def test_a_json_file_about_something_else_does_no_harm(save, text):
+    assert load_bracket(save(NAMES, {"settings.json": text, "times.txt": LISTED})).names == NAMES
+
+
+# ------------------------------------------------------------------------------------ photographs
+
+
+@pytest.mark.parametrize("inside", ["", "top/"])
+def test_a_zip_gives_the_same_bracket_as_the_folder(save, tmp_path, inside):
+    folder = save(NAMES, {"t.txt": LISTED})
+    assert_same(load_bracket(zipped(folder, tmp_path / "set.zip", inside)), load_bracket(folder))
+
+
+def test_what_macs_add_to_folders_and_zips_is_not_looked_at(save, tmp_path):
+    folder = save(NAMES, {"t.txt": LISTED})
+    plain = load_bracket(folder)
+    (folder / "._a_1.png").write_bytes(b"not a picture")
+    (folder / ".DS_Store").write_bytes(b"not a picture")
+    assert_same(load_bracket(folder), plain)
+    also = [f"__MACOSX/top/{name}" for name in (*NAMES, "._a_1.png")]
+    assert_same(load_bracket(zipped(folder, tmp_path / "set.zip", "top/", also)), plain)
+
+
+def test_photographs_come_in_ascending_time_whatever_their_names(save):
+    bracket = load_bracket(save(("d_1.png", "c_1.png", "b_1.png"), {"t.txt": "d_1.png 1\nc_1.png 2\nb_1.png 4\n"}))
+    assert bracket.names == ("d_1.png", "c_1.png", "b_1.png")
+    assert [image.mean() for image in bracket.images] == sorted(image.mean() for image in bracket.images)
+
+
+def test_colours_come_as_red_green_blue(tmp_path):
+    for i, scale in enumerate((1, 2)):
+        patch = np.full((8, 12, 3), (90, 40, 10), np.uint8) * scale
+        (tmp_path / f"p_{i}.ppm").write_bytes(b"P6 12 8 255\n" + patch.tobytes())  # a PPM file holds RGB
+    (tmp_path / "t.txt").write_text("1 2")
+    assert load_bracket(tmp_path).images[1][3, 3].tolist() == [180, 80, 20]
+
+
+def test_a_camera_held_upright_gives_upright_photographs(tmp_path, small_bracket):
+    for i, denominator in enumerate((400, 60)):
+        exif = exif_block(1, denominator, ">", orientation=6)  # turn by 90 degrees clockwise to show
+        write_with_exif(tmp_path / f"{i}.png", small_bracket.images[i], exif)
+    assert np.array_equal(load_bracket(tmp_path).images[0], np.rot90(small_bracket.images[0], -1))
+
+
+def test_16_bit_photographs_give_their_upper_8_bits(save, small_bracket):
+    folder = save(NAMES, {"t.txt": LISTED})
+    for name, image in zip(NAMES, small_bracket.images, strict=False):
+        cv2.imwrite(str(folder / name), image[..., ::-1].astype(np.uint16) * 256 + 255)
+    for image, expected in zip(load_bracket(folder).images, small_bracket.images, strict=False):
+        assert np.array_equal(image, expected)
+
+
+# -------------------------------------------------------------------------------------- bad input
+
+
+def refused(path, *words):
+    with pytest.raises(BracketError) as problem:
+        load_bracket(path)
+    for word in words:
+        assert word in str(problem.value)
+
+
+def test_a_missing_folder_is_refused(tmp_path):
+    refused(tmp_path / "nowhere", "nowhere", "does not exist")
+
+
+def test_a_file_that_is_no_zip_is_refused(tmp_path):
+    (tmp_path / "notes.zip").write_text("not a zip")
+    refused(tmp_path / "notes.zip", "notes.zip", "neither a folder nor a zip")
+
+
+def test_an_empty_folder_is_refused(tmp_path):
+    refused(tmp_path, tmp_path.name, "0 photographs")
+
+
+def test_an_empty_zip_is_refused(tmp_path):
+    zipfile.ZipFile(tmp_path / "empty.zip", "w").close()
+    refused(tmp_path / "empty.zip", "empty.zip", "0 photographs")
+
+
+def test_a_zip_that_unpacks_to_too_much_is_refused(save, tmp_path, monkeypatch):
+    monkeypatch.setattr("hdr_helpers.load.MAX_BYTES", 1000)
+    refused(zipped(save(NAMES), tmp_path / "bomb.zip"), "bomb.zip", "unpacks to")
+
+
+def test_a_damaged_zip_is_refused(save, tmp_path):
+    target = zipped(save(NAMES, {"t.txt": LISTED}), tmp_path / "damaged.zip")
+    data = bytearray(target.read_bytes())
+    data[2000] ^= 255
+    target.write_bytes(data)
+    refused(target, "damaged.zip")
+
+
+def test_a_single_photograph_is_refused(save):
+    refused(save(NAMES[:1], {"t.txt": "1"}), "1 photographs", "at least two")
+
+
+@pytest.mark.parametrize("data", [b"", b"not a picture", b"\xff\xd8\xff\xe0 cut short"])
+def test_a_file_that_is_no_picture_is_refused_by_name(save, data):
+    folder = save(NAMES, {"t.txt": LISTED})
+    (folder / "a_3.png").write_bytes(data)
+    refused(folder, "a_3.png")
+
+
+def test_half_a_photograph_is_refused_by_name(save):
+    folder = save(NAMES, {"t.txt": LISTED})
+    (folder / "a_3.png").write_bytes((folder / "a_3.png").read_bytes()[:9000])
+    refused(folder, "a_3.png")
+
+
+def test_different_sizes_are_refused_with_both(save, small_bracket):
+    folder = save(NAMES, {"t.txt": LISTED})
+    cv2.imwrite(str(folder / "a_2.png"), small_bracket.images[1][:-1, :-2])
+    refused(folder, "a_2.png", "158 x 119", "160 x 120")
+
+
+def test_a_list_without_one_of_the_photographs_is_refused_by_name(save):
+    refused(save(NAMES, {"t.txt": LISTED.replace("a_3.png", "b_3.png")}), "t.txt", "a_3.png")
+
+
+def test_a_list_with_a_time_that_is_no_number_is_refused_by_name(save):
+    refused(save(NAMES, {"t.txt": LISTED.replace("a_3.png ", "a_3.png nan#")}), "t.txt", "a_3.png")
+
+
+def test_equal_times_are_refused_with_both_names(save):
+    refused(save(NAMES, {"t.txt": "1/400 1/60 1/60 0.6"}), "a_2.png", "a_3.png", "0.0166667 s")
+
+
+def test_times_that_do_not_fit_the_brightness_are_refused(save):
+    refused(save(NAMES, {"t.txt": "0.1 0.6 1/400 1/60"}), "t.txt", "brighter")
+
+
+def test_no_times_at_all_are_refused_with_an_example(save):
+    refused(save(NAMES, {"read.txt": "taken from a tripod"}), "No exposure times", "read.txt", "1/60")
+
+
+@pytest.mark.parametrize("times", [(1, np.nan), (-1, 1), (0, 1), (1, np.inf), (1, 1), (2, 1)])
+def test_a_bracket_refuses_times_that_are_not_positive_and_ascending(small_bracket, times):
+    with pytest.raises(BracketError, match="positive and strictly ascending"):
+        Bracket(small_bracket.images[:2], times, ("a", "b"))
+
+
+def test_a_bracket_refuses_unequal_counts(small_bracket):
+    with pytest.raises(BracketError, match="2 images, 3 times and 2 names"):
+        Bracket(small_bracket.images[:2], (1, 2, 3), ("a", "b"))
+
+
+# ---------------------------------------------------------------------------------- real cameras
+
+REAL = {
+    "hdr": (0.033, 0.25, 2.5, 15),
+    "exposures": (1 / 1002, 1 / 403, 1 / 318, 1 / 79, 1 / 60, 1 / 4, 1 / 3, 0.81, 1, 3.22, 4, 9.93, 12.88),
+    "memorial": tuple(2.0 ** np.arange(-10, 6)),
+    "frobisher": (1 / 8, 1, 8),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_brackets_load_with_their_times_from_folder_and_zip(real, tmp_path, name):
+    bracket = load_bracket(real(name))
+    np.testing.assert_allclose(bracket.times, REAL[name], rtol=1e-6)
+    assert_same(load_bracket(zipped(real(name), tmp_path / "set.zip", f"{name}/")), bracket)
+
+
+def test_a_text_that_rounds_otherwise_than_exif_is_noted(real):
+    (note,) = load_bracket(real("exposures")).notes
+    assert "0.3333 s" in note and "0.3 s" in note
