@@ -1,0 +1,100 @@
+"""The house itself: who may import whom, what every notebook must have, what the README promises."""
+
+import ast
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+STAGES = ["load", "align", "crf", "merge", "tonemap"]
+
+
+def imports(path):
+    """Every module that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+def code_cells(notebook):
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return [cell | {"source": "".join(cell["source"])} for cell in cells if cell["cell_type"] == "code"]
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_imports_only_numbers_and_earlier_stages(stage):
+    earlier = {f"hdr_helpers.{name}" for name in STAGES[: STAGES.index(stage)]} | {"hdr_helpers._times"}
+    for module in imports(ROOT / "hdr_helpers" / f"{stage}.py"):
+        if module.startswith("hdr_helpers"):
+            assert module in earlier or module.startswith("hdr_helpers.papers")
+        else:
+            assert module.split(".")[0] not in {"matplotlib", "IPython", "ipywidgets", "nbgrader"}
+
+
+def test_a_paper_imports_no_stage():
+    papers = list((ROOT / "hdr_helpers" / "papers").glob("*.py"))
+    assert papers
+    for paper in papers:
+        assert not [m for m in imports(paper) if m.startswith("hdr_helpers")], paper.name
+
+
+def test_there_are_five_notebooks_named_like_the_five_stages():
+    assert [n.stem for n in NOTEBOOKS] == [f"0{i}_{stage}" for i, stage in enumerate(STAGES, 1)]
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda n: n.stem)
+def test_a_notebook_was_run_from_top_to_bottom_and_says_nothing_on_stderr(notebook):
+    cells = code_cells(notebook)
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    for cell in cells:
+        kinds = {output.get("name", output["output_type"]) for output in cell["outputs"]}
+        assert not kinds & {"stderr", "error"}, cell["source"]
+    assert notebook.stat().st_size < 3e6
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda n: n.stem)
+def test_every_picture_in_a_notebook_has_a_sentence_for_those_who_can_not_see_it(notebook):
+    pictures = 0
+    for cell in code_cells(notebook):
+        for output in cell["outputs"]:
+            for kind in output.get("data", {}):
+                if kind.startswith("image/"):
+                    pictures += 1
+                    alt = output["metadata"][kind]["alt"]
+                    assert alt[0].isupper() and alt.endswith(".") and len(alt.split()) >= 6, alt
+    assert pictures >= 5
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda n: n.stem)
+def test_every_todo_has_signature_docstring_and_a_marked_solution(notebook):
+    text = notebook.read_text(encoding="utf-8")
+    announced = re.findall(r"### TODO (\d\.\d)", text)
+    todos = [cell for cell in code_cells(notebook) if cell["metadata"].get("nbgrader", {}).get("solution")]
+    assert [f"todo-{number.replace('.', '-')}" for number in announced] == [
+        cell["metadata"]["nbgrader"]["grade_id"] for cell in todos
+    ]
+    for cell in todos:
+        assert cell["source"].count("### BEGIN SOLUTION") == cell["source"].count("### END SOLUTION") == 1
+        (function,) = ast.parse(cell["source"]).body
+        assert ast.get_docstring(function)
+
+
+def test_the_readmes_test_command_is_what_ci_runs():
+    (command,) = re.findall(
+        r"^python3 -m venv \.venv-test && .*$", (ROOT / "README.md").read_text(encoding="utf-8"), re.M
+    )
+    for path in (".ci/run", ".github/workflows/test.yml"):
+        assert command in (ROOT / path).read_text(encoding="utf-8"), path
+
+
+def test_the_environment_is_the_seven_packages_pinned_and_the_course_itself():
+    lines = [line for line in (ROOT / "environment.txt").read_text().splitlines() if not line.startswith("#")]
+    names = [line.split("==")[0] for line in lines if re.fullmatch(r"[\w-]+==[\d.]+", line)]
+    seven = ["numpy", "scipy", "opencv-python-headless", "matplotlib", "jupyterlab", "nbval", "ipywidgets"]
+    assert names == seven
+    assert lines[len(seven) :] == ["-e ."]
