@@ -66,7 +66,7 @@ def whole_white(image) -> np.ndarray:
     """A photograph, (H, W, 3) uint8, in which what is almost white and touches white is white.
 
     A clipped area in a JPEG is not all 255: here and there it reads 245, which would pass for a measurement.
-    In a long exposure such a pixel says of the sun that it is as dim as a wall, so it must not have a vote.
+    In a long exposure such a pixel says of the sun that it is hundreds of times too dim: it must not vote.
     """
     touches_white = cv2.dilate(image, np.ones((3, 3), np.uint8)) >= CLIPPED
     return np.where(touches_white & (image >= CLIPPED - RINGING), np.uint8(LEVELS - 1), image)
@@ -187,4 +187,16 @@ def recover_crf(bracket: Bracket, lam: float = 20.0, n: int = 20_000, seed: int 
     curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
     # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).
     curves = np.maximum.accumulate(curves, axis=1)
+    return curves - curves[:, MIDDLE : MIDDLE + 1]
+
+
+def crf_opencv(bracket: Bracket, method: str = "debevec") -> np.ndarray:
+    """What OpenCV recovers, in this course's form: (3, 256) float64, natural logarithms, crf[:, 128] = 0.
+
+    method : "debevec" (CalibrateDebevec) or "robertson" (CalibrateRobertson), with OpenCV's defaults
+    """
+    create = {"debevec": cv2.createCalibrateDebevec, "robertson": cv2.createCalibrateRobertson}[method]
+    # OpenCV wants float32 times: with float64 Robertson's answers another curve, and says nothing.
+    response = create().process(list(bracket.images), bracket.times.astype(np.float32))
+    curves = np.log(np.maximum(response[:, 0].T.astype(np.float64), 1e-12))
     return curves - curves[:, MIDDLE : MIDDLE + 1]

@@ -106,18 +106,17 @@ def _merge_by_tables(images, weighted, weights) -> np.ndarray:
 
 
 def merge_opencv(images, times, crf=None) -> np.ndarray:
-    """OpenCV's MergeDebevec behind this course's conventions: RGB, any float times, crf (3, 256).
+    """OpenCV's MergeDebevec behind this course's conventions: any float times, crf (3, 256), radiance out.
 
-    Returns radiance, (H, W, 3) float32, RGB. Where every photograph is clipped the result may be 0 or not
-    finite: that is OpenCV's own answer. Without crf OpenCV takes the camera for a linear one.
+    Returns radiance, (H, W, 3) float32, in the channel order of images. Where every photograph is clipped
+    the result may be 0 or not finite: that is OpenCV's own answer. Without crf OpenCV takes the camera for a
+    linear one.
     """
-    bgr = [np.ascontiguousarray(image[..., ::-1]) for image in images]
-    merge = cv2.createMergeDebevec()
-    times = np.asarray(times, dtype=np.float32)  # with float64 MergeDebevec answers inf, and says nothing
+    images, merge = [np.ascontiguousarray(image) for image in images], cv2.createMergeDebevec()
+    times = np.asarray(times, dtype=np.float32)  # with float64 it answers zeros and infinities, and says nothing
     if crf is None:
-        return merge.process(bgr, times)[..., ::-1].copy()
-    response = np.exp(np.asarray(crf)).T[:, None, ::-1].astype(np.float32)
-    return merge.process(bgr, times, np.ascontiguousarray(response))[..., ::-1].copy()
+        return merge.process(images, times)
+    return merge.process(images, times, np.exp(crf).T[:, None].astype(np.float32).copy())
 
 
 def write_hdr(path, radiance) -> None:

@@ -49,11 +49,13 @@ def test_every_control_that_applies_changes_the_picture(name, small_bracket):
 
 def test_the_tone_mapping_explorer_greys_out_what_the_operator_does_not_have(small_bracket):
     explorer = explorers.tonemap_explorer(small_bracket.truth.radiance)
-    operator, gamma, saturation, *of_reinhard = [c for c in controls(explorer) if not isinstance(c, widgets.HTML)]
+    operator, gamma, saturation, contrast, *of_reinhard = [
+        c for c in controls(explorer) if not isinstance(c, widgets.HTML)
+    ]
     operator.value = "drago"
-    assert [c.disabled for c in (gamma, saturation, *of_reinhard)] == [False, False, True, True, True]
+    assert [c.disabled for c in (gamma, saturation, contrast, *of_reinhard)] == [False, False, True, True, True, True]
     operator.value = "reinhard"
-    assert [c.disabled for c in (gamma, saturation, *of_reinhard)] == [False, True, False, False, False]
+    assert [c.disabled for c in (gamma, saturation, contrast, *of_reinhard)] == [False, True, True, False, False, False]
 
 
 def test_the_button_sets_the_sliders_to_the_shift_that_align_mtb_finds(chapel):

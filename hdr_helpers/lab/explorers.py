@@ -116,6 +116,7 @@ def tonemap_explorer(radiance):
     saturation = widgets.FloatSlider(
         1.0, min=0, max=1.5, step=0.05, description="saturation (drago, mantiuk, durand)", **CONTROL
     )
+    contrast = widgets.FloatLogSlider(30, min=0.5, max=3, step=0.1, description="contrast (durand)", **CONTROL)
     intensity = widgets.FloatSlider(0, min=-8, max=8, step=0.5, description="intensity (reinhard)", **CONTROL)
     light = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="light_adapt (reinhard)", **CONTROL)
     colour = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="color_adapt (reinhard)", **CONTROL)
@@ -123,14 +124,16 @@ def tonemap_explorer(radiance):
     uses = {  # beside gamma, which all of them have
         "gamma": {},
         "reinhard": {"intensity": intensity, "light_adapt": light, "color_adapt": colour},
-        **{name: {"saturation": saturation} for name in ("drago", "mantiuk", "durand")},
+        "drago": {"saturation": saturation},
+        "mantiuk": {"saturation": saturation},
+        "durand": {"saturation": saturation, "contrast": contrast},
     }
 
     def draw(operator, gamma, **_):
-        for control in (saturation, intensity, light, colour):
+        for control in (saturation, contrast, intensity, light, colour):
             control.disabled = control not in uses[operator].values()
         parameters = {name: control.value for name, control in uses[operator].items()}
         return jpeg_bytes(tonemap(small, operator, gamma=gamma, **parameters))
 
-    controls = {"operator": operator, "gamma": gamma, "saturation": saturation}
+    controls = {"operator": operator, "gamma": gamma, "saturation": saturation, "contrast": contrast}
     return _explorer(draw, {**controls, "intensity": intensity, "light": light, "colour": colour})

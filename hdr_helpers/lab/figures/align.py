@@ -19,12 +19,12 @@ def detail_figure(pictures, titles, detail, title=None, cols=None, scale=4):
 
 
 def bitmaps_figure(images, times):
-    """Photographs above their median threshold bitmaps, excluded pixels in grey."""
+    """Photographs above their median threshold bitmaps, excluded pixels in pink."""
     below = []
     for image in images:
         bright, clear = bitmaps(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
         shown = np.repeat(bright[..., None], 3, axis=2)
-        shown[clear == 0] = 128
+        shown[clear == 0] = (204, 121, 167)
         below.append(shown)
     titles = [*(seconds(t) for t in times), *("median threshold bitmap" for _ in times)]
     return pictures_figure(
@@ -36,7 +36,9 @@ def bitmaps_figure(images, times):
 
 
 def hand_figure(fixed, moving, shift):
-    """Two bitmaps laid over each other at a shift (dx, dy): white where they agree, coloured where not.
+    """Two bitmaps laid over each other at a shift (dx, dy): grey and white where they agree, else coloured.
+
+    Orange is bright in fixed alone, blue in moving alone.
 
     fixed, moving : (bright, clear) of align.bitmaps. Returns (H, W, 3) uint8.
     """
@@ -45,9 +47,9 @@ def hand_figure(fixed, moving, shift):
     matrix = np.float32([[1, 0, dx], [0, 1, dy]])
     bright, clear = (cv2.warpAffine(m, matrix, (width, height), flags=cv2.INTER_NEAREST) for m in moving)
     counted = (clear & fixed[1]) > 0
-    picture = np.full((height, width, 3), 255, dtype=np.uint8)
-    picture[fixed[0] > 0] = 225
-    picture[~counted] = 190
+    picture = np.full((height, width, 3), 205, dtype=np.uint8)
+    picture[fixed[0] > 0] = 255
+    picture[~counted] = 165
     picture[counted & (fixed[0] > bright)] = (213, 94, 0)
     picture[counted & (fixed[0] < bright)] = (0, 114, 178)
     return picture

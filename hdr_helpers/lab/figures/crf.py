@@ -20,7 +20,7 @@ def doubling_figure(bracket, point):
     """Pixel value against exposure time for one pixel, beside what a linear camera would have recorded."""
     row, col = point
     values = np.array([image[row, col, 1] for image in bracket.images], dtype=float)
-    first = np.argmax(values > 20)
+    first = np.argmax(values > 40)
     fig, ax = new_figure(1, 1, 3.4)
     ax.plot(bracket.times, values, "o-", color=THREE[0][0], label="what this camera recorded")
     linear = np.minimum(values[first] * bracket.times / bracket.times[first], 255)
@@ -56,7 +56,7 @@ def matrix_figure(A, n_data):
     ax.plot(cols, rows, ".", ms=2.2, color=INK, mec="none")
     height, width = A.shape
     for top, bottom, colour, text in (
-        (0, n_data, THREE[0][0], "data: one row for each sample in each photograph"),
+        (0, n_data, THREE[0][0], "data:\none row for each sample\nin each photograph"),
         (n_data, n_data + 1, ACCENT, "gauge: one row"),
         (n_data + 1, height, THREE[1][0], "smoothness: 254 rows"),
     ):

@@ -99,5 +99,5 @@ def one_photo_figure(bracket):
     right.set(ylabel="error, 95th percentile (stops)")
     left.set_title("what each photograph holds", fontsize=10)
     right.set_title("how wrong it is when taken for the whole scene", fontsize=10)
-    headline(fig, "Every photograph alone is stops away from the truth")
+    headline(fig, "In its worst twentieth every photograph alone is stops away from the truth")
     return fig

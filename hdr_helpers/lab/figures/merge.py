@@ -52,7 +52,9 @@ def viewed_at(radiance, stops: float, gamma: float = 2.2):
 def honest_figure(radiance, title="One radiance map, four exposures of it: nothing is lost, only not shown"):
     """A radiance map at four exposures."""
     stops = (-8, -4, 0, 3)
-    return pictures_figure([viewed_at(radiance, s) for s in stops], [f"{s:+d} stops" for s in stops], 4, title)
+    return pictures_figure(
+        [viewed_at(radiance, s) for s in stops], [f"{s:+d} stops" if s else "0 stops" for s in stops], 4, title
+    )
 
 
 def false_colour_figure(stops, title, label="stops above the median luminance", limits=None):
@@ -73,7 +75,7 @@ def error_figure(errors, titles, title, limit=0.5):
 
     errors : arrays (H, W, 3) or (H, W); three channels are averaged
     """
-    fig, axes = new_figure(1, len(errors), 10 / len(errors) * 0.667 + 0.9, squeeze=False)
+    fig, axes = new_figure(1, len(errors), 8.6 / len(errors) * 0.667 + 0.75, squeeze=False)
     colours = colormaps["PuOr_r"].with_extremes(bad="#888888")
     for ax, error, name in zip(axes[0], errors, titles, strict=True):
         bare(ax)

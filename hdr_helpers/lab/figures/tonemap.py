@@ -14,8 +14,8 @@ def eight_bits_figure(radiance):
     top = ax.get_ylim()[1]
     ax.set_ylim(0, 1.2 * top)
     ax.axvspan(-5.5, 2.5, color=THREE[0][0], alpha=0.3)
-    ax.annotate("8 stops: about what a screen shows", (-1.5, 1.08 * top), ha="center", color=INK)
-    ax.set(xlabel="stops above the median luminance", ylabel="share of pixels")
+    ax.annotate("8 stops: a screen of 256 to 1", (-1.5, 1.08 * top), ha="center", color=INK)
+    ax.set(xlabel="stops above the median luminance", ylabel="share of pixels per stop")
     plain(ax)
     headline(fig, "The scene is more than twice as wide as the screen")
     return fig
@@ -28,7 +28,12 @@ def curve_figure(operators, stops=(-10, 10)):
     looks = [*THREE, (ACCENT, "-.", "d"), (MUTED, "-", "v")]
     for (name, curve), (colour, style, marker) in zip(operators.items(), looks, strict=False):
         ax.plot(np.log2(light / 0.18), curve(light), style, color=colour, marker=marker, markevery=40, label=name)
-    ax.set(xlabel="scene luminance (stops above middle grey)", ylabel="display value", ylim=(-0.03, 1.06))
+    ax.set(
+        xlabel="scene luminance (stops above middle grey)",
+        ylabel="display value",
+        ylim=(-0.03, 1.06),
+        xticks=range(*stops, 2),
+    )
     ax.legend(frameon=False)
     plain(ax)
     headline(fig, "Reinhard's curve bends where clipping breaks off")
