@@ -22,7 +22,7 @@ def main(arguments=None) -> int:
     options = _parser().parse_args(arguments)
     out = options.out or Path(f"{options.bracket.resolve().stem}_hdr")
     try:
-        _refuse_to_overwrite(out, options.overwrite)
+        _check_output(out, options.bracket, options.overwrite)
         started = time.perf_counter()
         bracket = load_bracket(options.bracket)
         _run(bracket, out, options)
@@ -61,11 +61,14 @@ def _positive(text: str) -> float:
     return value
 
 
-def _refuse_to_overwrite(out: Path, allowed: bool) -> None:
+def _check_output(out: Path, bracket: Path, overwrite: bool) -> None:
     if out.exists() and not out.is_dir():
         raise FileExistsError(f"{out} is a file; give a folder to write to with -o.")
+    if out.resolve() == bracket.resolve():
+        # The next run would take the picture for a photograph.
+        raise FileExistsError(f"{out} holds the photographs; give another folder for the results with -o.")
     there = [name for name in (RADIANCE, CURVE, PLOT, PICTURE) if (out / name).exists()]
-    if there and not allowed:
+    if there and not overwrite:
         raise FileExistsError(f"{out} already holds {', '.join(there)}; give another folder with -o, or --overwrite.")
 
 

@@ -197,3 +197,11 @@ def test_a_zip_gives_the_same_results_as_its_folder(real, tmp_path):
     assert run(real("frobisher"), "-o", tmp_path / "a") == run(tmp_path / "frobisher.zip", "-o", tmp_path / "b") == 0
     a, b = contents(tmp_path / "a"), contents(tmp_path / "b")
     assert all(a[name] == b[name] for name in ("radiance.hdr", "crf.csv", "picture.png"))
+
+
+def test_results_are_not_written_among_the_photographs(save, capsys):
+    folder = save(NAMES, TIMES)
+    before = contents(folder)
+    assert run(folder, "-o", folder) == 1
+    assert "give another folder" in capsys.readouterr().err
+    assert contents(folder) == before
