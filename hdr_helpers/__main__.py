@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdr_helpers.align import align_mtb, crop_common
+from hdr_helpers.align import align_mtb, crop_common, shift_image
 from hdr_helpers.crf import recover_crf
 from hdr_helpers.load import Bracket, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
@@ -19,8 +19,12 @@ RADIANCE, CURVE, PLOT, PICTURE = "radiance.hdr", "crf.csv", "crf.png", "picture.
 
 def main(arguments=None) -> int:
     """Run the command line. Returns the exit code: 0 done, 1 input or output can't be used (2 is argparse's)."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a name that the console can't print must not end the run
     options = _parser().parse_args(arguments)
-    out = options.out or Path(f"{options.bracket.resolve().stem}_hdr")
+    place = options.bracket.resolve()
+    out = options.out or Path(f"{place.name if place.is_dir() else place.stem}_hdr")
     try:
         _check_output(out, options.bracket, options.overwrite)
         started = time.perf_counter()
@@ -28,6 +32,9 @@ def main(arguments=None) -> int:
         _run(bracket, out, options)
     except (ValueError, OSError) as problem:
         print(f"hdr_helpers: {problem}", file=sys.stderr)
+        return 1
+    except MemoryError:
+        print("hdr_helpers: Not enough memory for photographs of this size; scale them down first.", file=sys.stderr)
         return 1
     print(f"\nDone in {time.perf_counter() - started:.1f} s. The picture is {out / PICTURE}")
     return 0
@@ -83,13 +90,14 @@ def _run(bracket: Bracket, out: Path, options) -> None:
     for note in bracket.notes:
         print(f"Note: {note}")
 
-    shares = clipping(bracket.images)
+    truth = with_truth(bracket, options.bracket).truth
     shifts, doubtful = np.zeros((len(bracket), 2), dtype=int), np.zeros(len(bracket), dtype=bool)
     aligned = bracket
     if not options.no_align:
         alignment = align_mtb(bracket.images)
         shifts, doubtful = alignment.shifts, alignment.doubtful
         aligned = replace(bracket, images=crop_common(alignment.images, shifts))
+    shares = clipping(aligned.images)
     print(f"\n{'photograph':24} {'time (s)':>10} {'shift (px)':>11} {'too dark':>9} {'too bright':>11}")
     rows = zip(bracket.names, bracket.times, shifts, shares.too_dark, shares.too_bright, doubtful, strict=True)
     for name, seconds, (dx, dy), dark, bright, doubt in rows:
@@ -100,14 +108,16 @@ def _run(bracket: Bracket, out: Path, options) -> None:
         f"them, {shares.everywhere_dark:.3%} too dark."
     )
 
+    print("\nRecovering the response, merging, tone-mapping ...", flush=True)
     crf = recover_crf(aligned, lam=options.lam)
     radiance = merge_debevec(aligned.images, aligned.times, crf)
     print(f"Dynamic range of the scene: {dynamic_range_stops(radiance):.1f} stops (99.9th over 0.1th percentile).")
     picture = tonemap(radiance, options.tonemap)
 
-    truth = with_truth(bracket, options.bracket).truth
     if truth is not None:
-        (known,) = crop_common([truth.radiance], shifts)
+        # The radiance lies where the reference photograph lies.
+        own_shift = truth.shifts[len(bracket) // 2]
+        (known,) = crop_common([shift_image(truth.radiance, own_shift)], shifts)
         error = radiance_error(radiance, known)
         print(f"The truth is known here: median error {error.median:.3f} stops, 95% below {error.p95:.3f}.")
 

@@ -5,6 +5,7 @@ this set), times spelled in the file names, the EXIF tag ExposureTime. Whether a
 1/seconds can't be told from the list; the photographs tell, because a longer exposure is brighter.
 """
 
+import contextlib
 import json
 import re
 import struct
@@ -14,6 +15,7 @@ import numpy as np
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".ppm")
 TEXT_SUFFIXES = (".txt", ".csv", ".json")
+SEPARATOR = r"[\s,;:=\"']"  # what may stand between a name and its time
 ROUNDING = 0.05  # cameras print rounded times; two sources that differ by more are both reported
 
 
@@ -22,7 +24,14 @@ class BracketError(ValueError):
 
 
 def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, list[str]]:
-    """Exposure times in the order of names, where they came from, and notes on what was decided."""
+    """Exposure times in the order of names, where they came from, and notes on what was decided.
+
+    path : of the bracket, for messages; names : P file names
+    texts : dict from the name of a text file to its bytes
+    exif : P exposure times in seconds, None for a photograph without one
+    brightness : (P,) float, mean pixel value of each photograph
+    Raises BracketError where no source gives a time for every photograph, or none that can be true.
+    """
     lists = [(f"the text file {name}", _text_values(name, data, names)) for name, data in texts.items()]
     lists = [(source, *entry) for source, entry in lists if entry]
     found = [(source, values) for source, named, values in lists if named]  # a list of names is the surest
@@ -36,7 +45,8 @@ def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, l
             "there, one line for each photograph, as in: img_1.jpg 1/60"
         )
     source, values = found[0]
-    times, notes = _as_seconds(source, values, brightness)
+    fractions = any(re.search(rb"\b\d+/\d+\b", data) for name, data in texts.items() if name in source)
+    times, notes = _as_seconds(source, values, brightness, may_invert=source != "EXIF" and not fractions)
     for other, theirs in found[1:]:
         theirs, _ = _as_seconds(other, theirs, brightness)
         ratio = theirs / times
@@ -46,18 +56,21 @@ def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, l
     return times, source, notes
 
 
-def _as_seconds(source, values, brightness) -> tuple[np.ndarray, list[str]]:
-    """Turn seconds, 1/seconds or EV stops into seconds: the photographs must get brighter with time."""
+def _as_seconds(source, values, brightness, may_invert=True) -> tuple[np.ndarray, list[str]]:
+    """Turn seconds, 1/seconds or EV stops into seconds: the photographs must get brighter with time.
+
+    may_invert : False where the values are known to be seconds: EXIF's, and fractions such as 1/60
+    """
     notes = []
     if np.any(values <= 0):
         values = np.exp2(values)
         notes.append(f"{source[:1].upper()}{source[1:]} holds EV stops; times are relative, 2 to the EV.")
     i, j = np.triu_indices(len(values), 1)
     agreement = np.mean(np.sign(values[j] - values[i]) * np.sign(brightness[j] - brightness[i]))
-    if abs(agreement) < 0.5:
+    if abs(agreement) < 0.5 or (agreement < 0 and not may_invert):
         raise BracketError(
-            f"By {source} the photographs do not get brighter as the exposure gets longer; "
-            "check which time belongs to which photograph."
+            f"By {source} the photographs do not get brighter as the exposure gets longer; check which time "
+            "belongs to which photograph, and that ISO and aperture were fixed."
         )
     if agreement < 0:
         values = 1 / values
@@ -69,7 +82,7 @@ def _as_seconds(source, values, brightness) -> tuple[np.ndarray, list[str]]:
 
 def _text_values(name: str, data: bytes, names: list[str]) -> tuple[bool, list[float]] | None:
     """Whether a text file names the photographs, and its number for each; None where it lists no times."""
-    text = data.decode("utf-8-sig", errors="replace")
+    text = _decoded(data)
     rows = _json_rows(text) if name.lower().endswith(".json") else _line_rows(text)
     stems = {PurePosixPath(n).stem.lower() for n in names}
     named, bare = {}, []
@@ -79,7 +92,9 @@ def _text_values(name: str, data: bytes, names: list[str]) -> tuple[bool, list[f
             named[label] = numbers[0] if numbers else None
         else:
             bare.append(numbers)
-    if named:  # lists often name .ppm files where .png ones lie: the stem decides
+    if any(
+        value is not None for value in named.values()
+    ):  # lists often name .ppm files where .png ones lie: the stem decides
         missing = [n for n in names if named.get(PurePosixPath(n).stem.lower()) is None]
         if missing:
             raise BracketError(
@@ -87,32 +102,42 @@ def _text_values(name: str, data: bytes, names: list[str]) -> tuple[bool, list[f
                 f"as in: {missing[0]} 1/60"
             )
         return True, [named[PurePosixPath(n).stem.lower()] for n in names]
-    if None in bare:  # words that are neither names nor numbers: this is no list of times
+    if named or None in bare:  # words that are neither names nor numbers: this is no list of times
         return None
     flat = [v for row in bare for v in row]
     values = next((row for row in [flat, *bare] if len(row) == len(names)), None)
     return values and (False, values)
 
 
+def _decoded(data: bytes) -> str:
+    """Text as editors save it: UTF-8, UTF-16 (PowerShell), GB18030 (Chinese Windows), or at least its digits."""
+    encodings = ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "gb18030")
+    for encoding in encodings:
+        with contextlib.suppress(UnicodeDecodeError):
+            return data.decode(encoding)
+    return data.decode("latin-1")
+
+
 def _split_row(row: str, stems: set[str]) -> tuple[str | None, list[float] | None]:
     """The stem of the photograph that a row names, and the row's numbers; None for each where there is none."""
-    end = re.search(rf"({'|'.join(map(re.escape, IMAGE_SUFFIXES))})(?=$|[\s,;\"'])", row, re.IGNORECASE)
+    end = re.search(rf"({'|'.join(map(re.escape, IMAGE_SUFFIXES))})(?=$|{SEPARATOR})", row, re.IGNORECASE)
     if not end:
-        numbers = [_number(word) for word in re.split(r"[\s,;]+", row.strip())]
+        numbers = [_number(word) for word in re.split(rf"{SEPARATOR}+", row.strip())]
         return None, None if None in numbers else numbers
     # A name may hold blanks, and a time may stand before it: the longest ending that is a photograph's.
     before = row[: end.end()]
-    starts = [0, *(m.end() for m in re.finditer(r"[\s,;\"']+", before))]
+    starts = [0, *(m.end() for m in re.finditer(rf"{SEPARATOR}+", before))]
     candidates = [(PurePosixPath(before[start:].replace("\\", "/")).stem.lower(), start) for start in starts]
     label, start = next((c for c in candidates if c[0] in stems), candidates[-1])
-    words = re.split(r"[\s,;\"']+", row[end.end() :]) + re.split(r"[\s,;\"']+", before[:start])
+    words = re.split(rf"{SEPARATOR}+", row[end.end() :] + " " + before[:start])
     return label, [v for v in map(_number, words) if v is not None]
 
 
 def _line_rows(text: str) -> list[str]:
     """Lines that may hold times: no comments, no settings, no headers of words alone."""
     lines = (line.split("#")[0].strip() for line in text.splitlines())
-    return [line for line in lines if re.search(r"\d", line) and "=" not in line]
+    names = re.compile("|".join(map(re.escape, IMAGE_SUFFIXES)), re.IGNORECASE)
+    return [line for line in lines if re.search(r"\d", line) and ("=" not in line or names.search(line))]
 
 
 def _json_rows(text: str) -> list[str]:
@@ -133,7 +158,11 @@ def _name_values(names: list[str]) -> list[float] | None:
     stems = [PurePosixPath(n).stem for n in names]
     fractions = [re.search(r"(?:^|\D)(1)_(\d+)$|(\d+)_(1)$", s) for s in stems]
     if all(fractions):
-        return [float(m[1] or m[3]) / float(m[2] or m[4]) for m in fractions]
+        pairs = [(int(m[1] or m[3]), int(m[2] or m[4])) for m in fractions]
+        # set_1_1, set_1_2, set_1_3 count the frames, and 20240105_1 is a date: no times.
+        counted = sorted(bottom for _, bottom in pairs)
+        counter = counted == list(range(counted[0], counted[0] + len(counted)))
+        return None if counter or max(top for top, _ in pairs) > 60 else [top / bottom for top, bottom in pairs]
     decimals = [re.search(r"(\d+(?:\.\d+)?)s?$", s) for s in stems]
     # Frame counters are whole numbers too; only a decimal point somewhere says that these are times.
     return [float(m[1]) for m in decimals] if all(decimals) and any("." in m[1] for m in decimals) else None
@@ -161,8 +190,8 @@ def exif_exposure_time(exif: bytes) -> float | None:
 
 
 def _number(word: str) -> float | None:
-    """15, 0.5 or 1/60 as a float; None for anything else."""
-    top, _, bottom = word.partition("/")
+    """15, 0.5, 1/60 or 1/60s as a float; None for anything else."""
+    top, _, bottom = re.sub(r"(?<=\d)(s|sec)$", "", word, flags=re.IGNORECASE).partition("/")
     try:
         value = float(top) / float(bottom or 1)
     except (ValueError, ZeroDivisionError):

@@ -86,9 +86,12 @@ def crop_common(images, shifts) -> tuple[np.ndarray, ...]:
     """The part of aligned photographs that all of them show.
 
     images : P arrays (H, W, ...), aligned; shifts : (P, 2), what align_mtb moved them by
+    Raises ValueError where they have no part in common.
     """
     height, width = images[0].shape[:2]
     (left, top), (right, bottom) = np.maximum(shifts, 0).max(axis=0), np.minimum(shifts, 0).min(axis=0)
+    if top - bottom >= height or left - right >= width:
+        raise ValueError("The aligned photographs have no part in common; check that they show one scene.")
     return tuple(image[top : height + bottom, left : width + right] for image in images)
 
 

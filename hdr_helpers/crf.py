@@ -44,17 +44,26 @@ def fitted_weights(images) -> np.ndarray:
     return hat_weights(max(black_level(images), NOISE), CLIPPED)
 
 
+def checked_weights(w) -> np.ndarray:
+    """w as (256,) float64. Raises ValueError unless it holds 256 weights, none negative and not all 0."""
+    w = np.asarray(w, dtype=np.float64)
+    if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
+        raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+    return w
+
+
 def black_level(images) -> int:
     """The pixel value that stands for no light: 0 in most files, about 17 in some scans.
 
-    images : P arrays (H, W, 3) uint8, shortest exposure first
+    images : P arrays (H, W, 3) uint8, aligned, shortest exposure first
     It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
     nothing of the scene, yet each of the short exposures would say it with conviction.
     """
     if len(images) < 2:
         return 0
     shortest, longer = (image[::2, ::2] for image in images[:2])
-    joint = np.histogram2d(shortest.ravel(), longer.ravel(), bins=LEVELS, range=((0, LEVELS), (0, LEVELS)))[0]
+    pairs = shortest.astype(np.intp) * LEVELS + longer
+    joint = np.bincount(pairs.ravel(), minlength=LEVELS**2).reshape(LEVELS, LEVELS)
     count = joint.sum(axis=1)
     median = np.argmax(np.cumsum(joint, axis=1) >= count[:, None] / 2, axis=1)
     dark = np.arange(LEVELS) < LEVELS // 4
@@ -84,13 +93,12 @@ def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
     float64, the log irradiance of each pixel, NaN where all its values have weight 0.
     Raises ValueError where shapes or values don't fit.
     """
-    Z, B, w = np.asarray(Z), np.asarray(B, dtype=np.float64), np.asarray(w, dtype=np.float64)
+    Z, B = np.asarray(Z), np.asarray(B, dtype=np.float64)
     if Z.ndim != 2 or not Z.size or B.shape != Z.shape[1:]:
         raise ValueError(f"Z must be (N, P) and B (P,), one log time for each column; got {Z.shape}, {B.shape}.")
     if not np.issubdtype(Z.dtype, np.integer) or Z.min() < 0 or Z.max() >= LEVELS:
         raise ValueError(f"Z must hold integers in 0..{LEVELS - 1}; got {Z.dtype} in {Z.min()}..{Z.max()}.")
-    if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
-        raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+    w = checked_weights(w)
     if not lam > 0:
         raise ValueError(f"lam must be positive; got {lam}.")
     if not np.all(np.isfinite(B)) or np.ptp(B) == 0:

@@ -50,6 +50,8 @@ class Bracket:
     source : where the times came from, for people
     notes : sentences for people: what was decided or looked odd while loading
     truth : Truth where the camera was a virtual one, else None
+
+    Raises BracketError where these do not fit each other.
     """
 
     images: tuple[np.ndarray, ...]
@@ -93,7 +95,7 @@ def load_bracket(path) -> Bracket:
     path : folder or .zip that holds the photographs (JPEG, PNG, TIFF, BMP or PPM) and, if the times
         are neither in the file names nor in EXIF, one text file that lists them
 
-    Returns a Bracket in ascending time. 16-bit files are read as their upper 8 bits.
+    Returns a Bracket in ascending time. 16-bit files are reduced to 8 bits.
     Raises BracketError where the photographs or the times can't be used.
     """
     path = Path(path)
@@ -102,7 +104,7 @@ def load_bracket(path) -> Bracket:
     if len(names) < 2:
         raise BracketError(
             f"{path} holds {len(names)} photographs; a bracket needs at least two of "
-            f"{', '.join(IMAGE_SUFFIXES)} in one folder."
+            f"{', '.join(IMAGE_SUFFIXES)} in one folder. HEIC and raw files have to be exported as JPEG first."
         )
     images, exif = zip(*(_decode(name, files[name]()) for name in names), strict=True)
     texts = {n: files[n]() for n in sorted(files) if n.lower().endswith(TEXT_SUFFIXES)}
@@ -162,7 +164,9 @@ def _decode(name: str, data: bytes) -> tuple[np.ndarray, float | None]:
     except cv2.error:
         image = None
     if image is None:
-        raise BracketError(f"{name} can't be read as a picture; JPEG, PNG, TIFF, BMP and PPM files can.")
+        raise BracketError(
+            f"{name} can't be read as a picture; JPEG, PNG, TIFF, BMP and PPM files of 8 or 16 bits can."
+        )
     exif = {int(k): bytes(m) for k, m in zip(kinds, metadata, strict=False)}.get(cv2.IMAGE_METADATA_EXIF)
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), exif_exposure_time(exif) if exif else None
 

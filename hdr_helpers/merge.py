@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hdr_helpers.crf import LEVELS, fitted_weights, whole_white
+from hdr_helpers.crf import LEVELS, checked_weights, fitted_weights, whole_white
 
 LAST_RESORT = 1e-5  # of the largest weight: decides only where no photograph has any other weight
 LEAST = 1e-9  # of the largest weight: no sum of weights is 0, whatever the values
@@ -64,16 +64,14 @@ def merge_debevec(images, times, crf, w=None) -> np.ndarray:
     if len(images) != len(times) or not len(images):
         raise ValueError(f"One exposure time for each photograph is needed; got {len(times)} for {len(images)}.")
     for image in images:
-        if image.dtype != np.uint8 or image.shape != images[0].shape or image.ndim != 3:
+        if image.dtype != np.uint8 or image.shape != images[0].shape or image.shape[2:] != (3,):
             raise ValueError(f"Images must be uint8 of one size (H, W, 3); got {image.dtype} {image.shape}.")
     if not (np.all(np.isfinite(times)) and np.all(times > 0)):
         raise ValueError(f"Exposure times must be positive seconds; got {times.tolist()}.")
     if crf.shape != (3, LEVELS) or not np.all(np.isfinite(crf)):
         raise ValueError(f"crf must be (3, {LEVELS}) and finite; got {crf.shape}.")
     shortest_first = [images[i] for i in np.argsort(times)]
-    w = fitted_weights(shortest_first) if w is None else np.asarray(w, dtype=np.float64)
-    if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
-        raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+    w = fitted_weights(shortest_first) if w is None else checked_weights(w)
     # In the shortest exposure even a doubtful value is better than none: nothing sees more.
     settled = [image if t == times.min() else whole_white(image) for image, t in zip(images, times, strict=True)]
     return _merge_by_tables(settled, *_tables(times, crf, w))
@@ -89,10 +87,11 @@ def _tables(times, crf, w) -> tuple[np.ndarray, np.ndarray]:
         weights[side] = np.maximum(weights[side], LAST_RESORT * w.max())
     weighted = weights[..., None] * (crf.T - np.log(times)[:, None, None])
     weights = np.repeat(weights[..., None], 3, axis=2)
-    return (np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))
+    return tuple(np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))
 
 
 def _merge_by_tables(images, weighted, weights) -> np.ndarray:
+    """Look up and add, some rows at a time; equation 6 and the exponential at the end."""
     radiance = np.empty(images[0].shape, dtype=np.float32)
     for top in range(0, len(radiance), TILE_ROWS):
         rows = np.s_[top : top + TILE_ROWS]
@@ -135,5 +134,9 @@ def write_hdr(path, radiance) -> None:
 def write_whole(path, data: bytes) -> None:
     """Write a file so that it is either complete or not there: first beside its place, then into it."""
     part = Path(path).with_name(Path(path).name + ".part")
-    part.write_bytes(data)
-    os.replace(part, path)
+    try:
+        part.write_bytes(data)
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise

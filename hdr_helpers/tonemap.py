@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 
 from hdr_helpers.merge import write_whole
-from hdr_helpers.papers.durand2002 import tonemap_durand
+from hdr_helpers.papers.durand2002 import LUMINANCE, tonemap_durand
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)  # Rec. 709
 DARKEST, BRIGHTEST = 0.1, 99.9  # percentiles of luminance between which a scene's range is measured
 
 
@@ -24,9 +23,11 @@ def luminance(radiance) -> np.ndarray:
 def dynamic_range_stops(radiance) -> float:
     """log2 of the ratio between the 99.9th and the 0.1th percentile of luminance.
 
-    Percentiles, because a single noisy pixel would decide the ratio of maximum and minimum.
+    Percentiles, because a single noisy pixel would decide the ratio of maximum and minimum. Pixels without
+    light, which OpenCV's merge leaves where it knows nothing, do not count.
     """
-    low, high = np.percentile(luminance(radiance), [DARKEST, BRIGHTEST])
+    light = luminance(radiance)
+    low, high = np.percentile(light[light > 0], [DARKEST, BRIGHTEST])
     return float(np.log2(high / low))
 
 
@@ -59,13 +60,13 @@ def expose_for_screen(radiance) -> np.ndarray:
     absurdly bright pixel would darken all others.
     """
     safe = np.array(radiance, dtype=np.float32)
-    finite = safe[np.isfinite(safe)]
-    if finite.size == 0 or finite.max() <= 0:
+    brightest = np.max(safe, where=np.isfinite(safe), initial=0)
+    if brightest <= 0:
         return np.zeros_like(safe)
-    np.nan_to_num(safe, copy=False, nan=0, posinf=finite.max(), neginf=0)
+    np.nan_to_num(safe, copy=False, nan=0, posinf=brightest, neginf=0)
     np.maximum(safe, 0, out=safe)
     white = np.percentile(luminance(safe), BRIGHTEST)
-    return np.minimum(safe / (white if white > 0 else finite.max()), 1)
+    return np.minimum(safe / (white if white > 0 else brightest), 1)
 
 
 def tonemap_gamma(radiance, gamma: float = 2.2, stops: float = 0.0) -> np.ndarray:
@@ -131,5 +132,7 @@ def write_picture(path, ldr) -> None:
     path = Path(path)
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise ValueError(f"{path}: pictures are written as .png or .jpg.")
-    _, data = cv2.imencode(path.suffix.lower(), np.ascontiguousarray(to_8bit(ldr)[..., ::-1]))
+    done, data = cv2.imencode(path.suffix.lower(), np.ascontiguousarray(to_8bit(ldr)[..., ::-1]))
+    if not done:
+        raise ValueError(f"{path}: OpenCV could not write this picture of shape {ldr.shape}.")
     write_whole(path, data.tobytes())

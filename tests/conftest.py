@@ -1,5 +1,7 @@
 """What several test files share."""
 
+import os
+import tempfile
 from pathlib import Path
 
 import cv2
@@ -7,6 +9,9 @@ import pytest
 
 from hdr_helpers.lab import data
 from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, scene
+
+# Notebooks under test keep their results away from a student's own; kernels inherit this.
+os.environ["HDR_RESULTS"] = tempfile.mkdtemp(prefix="hdr_results_")
 
 REAL = Path(__file__).parents[2] / "shared" / "brackets"
 

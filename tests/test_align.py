@@ -119,3 +119,8 @@ def test_the_exclusion_bitmap_leaves_out_what_noise_could_flip():
 @pytest.mark.parametrize("name, most", [("memorial", 0), ("window", 1)])
 def test_photographs_known_to_be_registered_stay(real, name, most):
     assert np.abs(align_mtb(load_bracket(real(name)).images).shifts).max() <= most
+
+
+def test_photographs_without_a_common_part_are_refused():
+    with pytest.raises(ValueError, match="no part in common"):
+        crop_common([np.zeros((100, 100, 3), np.uint8)] * 2, [(-60, 0), (60, 0)])

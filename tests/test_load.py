@@ -59,6 +59,8 @@ SPELLED = {
     "a JSON object": ("t.json", json.dumps(KNOWN)),
     "a JSON list": ("t.json", json.dumps([{"file": n, "seconds": t} for n, t in KNOWN.items()])),
     "a JSON list, seconds first": ("t.json", json.dumps([{"t": t, "f": n} for n, t in KNOWN.items()][::-1])),
+    "names, colons and seconds": ("t.txt", LISTED.replace(" ", ": ")),
+    "names, equal signs and a unit": ("t.txt", LISTED.replace(" ", " = ").replace("\n", "s\n")),
     "seconds and names, in any order": ("t.txt", "0.6 a_4.png\n0.1 a_3.png\n1/400 a_1.png\n1/60 a_2.png\n"),
 }
 
@@ -76,6 +78,27 @@ def test_a_list_of_names_with_blanks_gives_each_photograph_its_own_time(save):
     names = [f"my photo ({i}).png" for i in (1, 2, 3, 4)]
     lines = [f"{name} {seconds}\n" for name, seconds in zip(names, TIMES, strict=True)]
     np.testing.assert_allclose(load_bracket(save(names, {"t.txt": "".join(lines[::-1])})).times, TIMES)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "gb18030"])
+def test_a_list_may_be_saved_as_editors_save_it_names_in_chinese_included(save, encoding):
+    names = [f"照片{i}.png" for i in (1, 2, 3, 4)]
+    folder = save(names)
+    lines = [f"{name} {seconds}\n" for name, seconds in zip(names, TIMES, strict=True)]
+    (folder / "t.txt").write_text("".join(lines[::-1]), encoding=encoding)
+    np.testing.assert_allclose(load_bracket(folder).times, TIMES)
+
+
+def test_a_note_about_one_photograph_does_no_harm_to_the_list(save):
+    bracket = load_bracket(save(NAMES, {"a_note.txt": "a_3.png is a bit blurred", "t.txt": LISTED}))
+    np.testing.assert_allclose(bracket.times, TIMES)
+
+
+@pytest.mark.parametrize(
+    "names", [[f"set_1_{i}.png" for i in (1, 2, 3, 4)], [f"2024010{i}_1.png" for i in (5, 6, 7, 8)]]
+)
+def test_counters_and_dates_in_file_names_are_no_times(save, names):
+    refused(save(names), "No exposure times were found")
 
 
 def test_a_list_without_names_follows_the_natural_order_of_names(save, small_bracket):
@@ -270,6 +293,15 @@ def test_equal_times_are_refused_with_both_names(save):
 
 def test_times_that_do_not_fit_the_brightness_are_refused(save):
     refused(save(NAMES, {"t.txt": "0.1 0.6 1/400 1/60"}), "t.txt", "brighter")
+
+
+def test_fractions_and_exif_are_seconds_and_are_never_turned_into_their_inverse(save, tmp_path, small_bracket):
+    refused(save(NAMES, {"t.txt": "0.6 0.1 1/60 1/400"}), "do not get brighter")
+    folder = tmp_path / "exif"
+    folder.mkdir()
+    for name, image, fraction in zip(NAMES, small_bracket.images, ((6, 10), (1, 10), (1, 60), (1, 400)), strict=False):
+        write_with_exif(folder / name, image, exif_block(*fraction, "<"))
+    refused(folder, "EXIF", "do not get brighter")
 
 
 def test_no_times_at_all_are_refused_with_an_example(save):

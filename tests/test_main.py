@@ -205,3 +205,24 @@ def test_results_are_not_written_among_the_photographs(save, capsys):
     assert run(folder, "-o", folder) == 1
     assert "give another folder" in capsys.readouterr().err
     assert contents(folder) == before
+
+
+def test_a_hand_held_brackets_true_error_is_measured_where_the_reference_lies(tmp_path, capsys):
+    shifts = [(3, -5), (-6, 2), (4, 6), (0, -3), (-2, 1)]
+    bracket = Camera(seed=5).shoot(scene("chapel")[60:320, 200:560], CHAPEL_TIMES[2:7], shifts)
+    folder = tmp_path / "handheld"
+    folder.mkdir()
+    for name, image, seconds in zip("abcde", bracket.images, bracket.times, strict=True):
+        cv2.imwrite(str(folder / f"{name}_{seconds:.6f}.png"), image[..., ::-1])
+    data.save_truth(folder, bracket.truth, 4)
+    assert run(folder, "-o", tmp_path / "out") == 0
+    (median,) = re.findall(r"median error ([\d.]+) stops", capsys.readouterr().out)
+    assert float(median) < 0.05
+
+
+def test_the_truth_of_other_photographs_is_refused_before_anything_is_written(save, tmp_path, chapel, capsys):
+    folder = save(NAMES, TIMES)
+    data.save_truth(folder, chapel.truth, 4)
+    assert run(folder, "-o", tmp_path / "out") == 1
+    assert "truth.npz is not the truth of these photographs" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

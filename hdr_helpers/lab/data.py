@@ -1,13 +1,14 @@
 """The brackets that the course brings along, and their truth."""
 
 import io
+import zipfile
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from hdr_helpers.load import Bracket, Truth, load_bracket
+from hdr_helpers.load import Bracket, BracketError, Truth, load_bracket
 from hdr_helpers.merge import write_whole
 
 DATA = Path(__file__).parents[2] / "data"
@@ -20,21 +21,37 @@ def chapel() -> Bracket:
 
 
 def with_truth(bracket: Bracket, folder) -> Bracket:
-    """The same bracket with the truth of folder/truth.npz, or as it is where there is no such file."""
+    """The same bracket with the truth of folder/truth.npz, or as it is where there is no such file.
+
+    Raises BracketError where the file is not the truth of these photographs.
+    """
     path = Path(folder) / "truth.npz"
     if not path.is_file():
         return bracket
-    with np.load(path) as stored:
-        radiance = stored["radiance"].astype(np.float32) * stored["scale"]
-        return replace(bracket, truth=Truth(radiance.astype(np.float32), stored["crf"]))
+    try:
+        with np.load(path) as stored:
+            radiance = (stored["radiance"].astype(np.float32) * stored["scale"]).astype(np.float32)
+            truth = Truth(radiance, stored["crf"], stored["shifts"])
+    except (KeyError, ValueError) as problem:
+        raise BracketError(f"{path} is not a truth file ({problem}); remove it, or make the bracket again.") from None
+    if truth.radiance.shape != bracket.images[0].shape:
+        raise BracketError(f"{path} is not the truth of these photographs: its size differs. Remove it.")
+    return replace(bracket, truth=truth)
 
 
 def save_truth(folder, truth: Truth, scale: float) -> None:
-    """Write folder/truth.npz: radiance / scale as float16, and the crf, float64.
+    """Write folder/truth.npz: radiance / scale as float16, crf as float64, and the shifts.
 
-    Not compressed: that saves a tenth, and what a compressor writes depends on its version.
+    The same bytes everywhere, so neither np.savez, which writes the name of the system, nor a compressor,
+    which would save a tenth and depends on its version.
     """
-    content = io.BytesIO()
     half = (truth.radiance / scale).astype(np.float16)
-    np.savez(content, radiance=half, scale=np.float32(scale), crf=truth.crf)
+    arrays = {"radiance": half, "scale": np.float32(scale), "crf": truth.crf, "shifts": truth.shifts.astype("<i8")}
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, array in arrays.items():
+            info, part = zipfile.ZipInfo(f"{name}.npy"), io.BytesIO()
+            info.create_system = 3
+            np.lib.format.write_array(part, np.asarray(array))
+            archive.writestr(info, part.getvalue())
     write_whole(Path(folder) / "truth.npz", content.getvalue())

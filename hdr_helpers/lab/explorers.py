@@ -18,7 +18,7 @@ from hdr_helpers.lab.figures import (
     viewed_at,
 )
 from hdr_helpers.lab.metrics import crf_rmse
-from hdr_helpers.tonemap import expose_for_screen, tonemap
+from hdr_helpers.tonemap import OPERATORS, expose_for_screen, tonemap
 
 PREVIEW = 640  # pixels across in explorers that compute while a slider moves
 CONTROL = {"style": {"description_width": "190px"}, "layout": {"width": "560px"}}
@@ -80,11 +80,13 @@ def crf_explorer(bracket, channel=1):
         value=1, description="exposures", **CONTROL,
     )  # fmt: skip
 
+    weights = {every: fitted_weights(bracket.images[::every]) for _, every in every.options}
+
     def draw(lam, n, every):
         images, B = bracket.images[::every], bracket.log_times[::every]
         rows, cols = sample_pixels(images, n)
         Z = np.stack([image[rows, cols, channel] for image in images], axis=1)
-        g, log_E = gsolve(Z, B, lam, fitted_weights(images))
+        g, log_E = gsolve(Z, B, lam, weights[every])
         title = f"{n} samples in {len(images)} photographs, lambda {lam:.3g}"
         picture = jpeg_bytes(data_on_curve_figure(Z, B, g, log_E, title))
         if bracket.truth is None:
@@ -107,7 +109,7 @@ def tonemap_explorer(radiance):
     size = (PREVIEW, round(PREVIEW * height / width))
     small = expose_for_screen(cv2.resize(radiance, size, interpolation=cv2.INTER_AREA))
     operator = widgets.Dropdown(
-        options=["gamma", "reinhard", "drago", "mantiuk", "durand"],
+        options=list(OPERATORS),
         value="reinhard",
         description="operator",
         **CONTROL,
@@ -131,8 +133,8 @@ def tonemap_explorer(radiance):
 
     def draw(operator, gamma, **_):
         for control in (saturation, contrast, intensity, light, colour):
-            control.disabled = control not in uses[operator].values()
-        parameters = {name: control.value for name, control in uses[operator].items()}
+            control.disabled = control not in uses.get(operator, {}).values()
+        parameters = {name: control.value for name, control in uses.get(operator, {}).items()}
         return jpeg_bytes(tonemap(small, operator, gamma=gamma, **parameters))
 
     controls = {"operator": operator, "gamma": gamma, "saturation": saturation, "contrast": contrast}

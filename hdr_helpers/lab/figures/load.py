@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from matplotlib import patheffects
 
+from hdr_helpers.crf import CLIPPED, NOISE
 from hdr_helpers.lab.figures.style import (
     BRIGHT_MARK,
     CHANNELS,
@@ -19,7 +20,7 @@ from hdr_helpers.lab.figures.style import (
 )
 from hdr_helpers.lab.metrics import radiance_error
 
-TOO_DARK, TOO_BRIGHT = 3, 250  # pixel values below and from which a JPEG says nothing to rely on
+TOO_DARK, TOO_BRIGHT = NOISE + 1, CLIPPED  # pixel values below and from which a JPEG says nothing to rely on
 
 
 def strip_figure(bracket, title=None, cols=5):
