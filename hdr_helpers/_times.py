@@ -32,23 +32,37 @@ def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, l
     brightness : (P,) float, mean pixel value of each photograph
     Raises BracketError where no source gives a time for every photograph, or none that can be true.
     """
-    lists = [(f"the text file {name}", _text_values(name, data, names)) for name, data in texts.items()]
-    lists = [(source, *entry) for source, entry in lists if entry]
-    found = [(source, values) for source, named, values in lists if named]  # a list of names is the surest
-    found += [(source, values) for source, named, values in lists if not named]
-    found += [("the file names", _name_values(names)), ("EXIF", exif if all(exif) else None)]
-    found = [(source, np.array(values, dtype=np.float64)) for source, values in found if values is not None]
+    lists = []
+    for name, data in texts.items():
+        entry = _text_values(name, data, names)
+        if entry:
+            written_as_fractions = re.search(rb"\b\d+/\d+\b", data)
+            lists.append((f"the text file {name}", *entry, not written_as_fractions))
+    lists.sort(key=lambda entry: not entry[1])  # a list that names the photographs is the surest
+    found = [(source, values, may_invert) for source, _, values, may_invert in lists]
+    found += [("the file names", _name_values(names), True), ("EXIF", exif if all(exif) else None, False)]
+    found = [entry for entry in found if entry[1] is not None]
     if not found:
         listed = f" {', '.join(texts)} held no line for each of the {len(names)} photographs." if texts else ""
         raise BracketError(
             f"No exposure times were found for the photographs in {path}.{listed} Put them in a text file "
             "there, one line for each photograph, as in: img_1.jpg 1/60"
         )
-    source, values = found[0]
-    fractions = any(re.search(rb"\b\d+/\d+\b", data) for name, data in texts.items() if name in source)
-    times, notes = _as_seconds(source, values, brightness, may_invert=source != "EXIF" and not fractions)
-    for other, theirs in found[1:]:
-        theirs, _ = _as_seconds(other, theirs, brightness)
+
+    agreed, notes, misfits = [], [], []
+    for source, values, may_invert in found:
+        try:
+            times, decided = _as_seconds(source, np.array(values, dtype=np.float64), brightness, may_invert)
+        except BracketError as misfit:
+            misfits.append(misfit)
+            continue
+        notes += decided if not agreed else []
+        agreed.append((source, times))
+    if not agreed:
+        raise misfits[0]
+    source, times = agreed[0]
+    notes += [str(misfit) for misfit in misfits]
+    for other, theirs in agreed[1:]:
         ratio = theirs / times
         ratio /= np.median(ratio)  # a factor common to all does no harm: radiance is relative
         for i in np.flatnonzero(np.abs(ratio - 1) > ROUNDING):
@@ -56,7 +70,7 @@ def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, l
     return times, source, notes
 
 
-def _as_seconds(source, values, brightness, may_invert=True) -> tuple[np.ndarray, list[str]]:
+def _as_seconds(source, values, brightness, may_invert) -> tuple[np.ndarray, list[str]]:
     """Turn seconds, 1/seconds or EV stops into seconds: the photographs must get brighter with time.
 
     may_invert : False where the values are known to be seconds: EXIF's, and fractions such as 1/60

@@ -304,6 +304,15 @@ def test_fractions_and_exif_are_seconds_and_are_never_turned_into_their_inverse(
     refused(folder, "EXIF", "do not get brighter")
 
 
+def test_a_source_that_can_not_be_true_gives_way_to_one_that_can_and_is_noted(save):
+    names = [f"img_{seconds:.4f}.png" for seconds in TIMES]
+    shuffled = "".join(f"{name} {TIMES[i]}\n" for name, i in zip(names, (2, 0, 3, 1), strict=True))
+    bracket = load_bracket(save(names, {"t.txt": shuffled}))
+    assert bracket.source == "the file names"
+    np.testing.assert_allclose(bracket.times, TIMES, rtol=0.01)
+    assert any("t.txt" in note and "do not get brighter" in note for note in bracket.notes)
+
+
 def test_no_times_at_all_are_refused_with_an_example(save):
     refused(save(NAMES, {"read.txt": "taken from a tripod"}), "No exposure times", "read.txt", "1/60")
 
