@@ -114,14 +114,12 @@ def tonemap_explorer(radiance):
         description="operator",
         **CONTROL,
     )
-    gamma = widgets.FloatSlider(2.2, min=1, max=4, step=0.1, description="gamma (all)", **CONTROL)
-    saturation = widgets.FloatSlider(
-        1.0, min=0, max=1.5, step=0.05, description="saturation (drago, mantiuk, durand)", **CONTROL
-    )
-    contrast = widgets.FloatLogSlider(30, min=0.5, max=3, step=0.1, description="contrast (durand)", **CONTROL)
-    intensity = widgets.FloatSlider(0, min=-8, max=8, step=0.5, description="intensity (reinhard)", **CONTROL)
-    light = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="light_adapt (reinhard)", **CONTROL)
-    colour = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="color_adapt (reinhard)", **CONTROL)
+    gamma = widgets.FloatSlider(2.2, min=1, max=4, step=0.1, description="gamma", **CONTROL)
+    saturation = widgets.FloatSlider(1.0, min=0, max=1.5, step=0.05, description="saturation", **CONTROL)
+    contrast = widgets.FloatLogSlider(30, min=0.5, max=3, step=0.1, description="contrast", **CONTROL)
+    intensity = widgets.FloatSlider(0, min=-8, max=8, step=0.5, description="intensity", **CONTROL)
+    light = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="light_adapt", **CONTROL)
+    colour = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="color_adapt", **CONTROL)
 
     uses = {  # beside gamma, which all of them have
         "gamma": {},
