@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdr_helpers.align import align_mtb, crop_common, shift_image
+from hdr_helpers.align import Alignment, align_mtb, crop_common, shift_image
 from hdr_helpers.crf import recover_crf
 from hdr_helpers.load import Bracket, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
@@ -91,15 +91,18 @@ def _run(bracket: Bracket, out: Path, options) -> None:
         print(f"Note: {note}")
 
     truth = with_truth(bracket, options.bracket).truth
-    shifts, doubtful = np.zeros((len(bracket), 2), dtype=int), np.zeros(len(bracket), dtype=bool)
-    aligned = bracket
-    if not options.no_align:
+    if options.no_align:
+        still, sure = np.zeros((len(bracket), 2), dtype=int), np.zeros(len(bracket), dtype=bool)
+        alignment = Alignment(bracket.images, still, 0, sure)
+    else:
         alignment = align_mtb(bracket.images)
-        shifts, doubtful = alignment.shifts, alignment.doubtful
-        aligned = replace(bracket, images=crop_common(alignment.images, shifts))
+    shifts = alignment.shifts
+    aligned = replace(bracket, images=crop_common(alignment.images, shifts))
     shares = clipping(aligned.images)
     print(f"\n{'photograph':24} {'time (s)':>10} {'shift (px)':>11} {'too dark':>9} {'too bright':>11}")
-    rows = zip(bracket.names, bracket.times, shifts, shares.too_dark, shares.too_bright, doubtful, strict=True)
+    rows = zip(
+        bracket.names, bracket.times, shifts, shares.too_dark, shares.too_bright, alignment.doubtful, strict=True
+    )
     for name, seconds, (dx, dy), dark, bright, doubt in rows:
         mark = "  not sure of its shift; left beside its neighbour" if doubt else ""
         print(f"{name:24} {seconds:10.6g} {f'{dx:+d} {dy:+d}':>11} {dark:9.2%} {bright:11.2%}{mark}")
@@ -116,8 +119,7 @@ def _run(bracket: Bracket, out: Path, options) -> None:
 
     if truth is not None:
         # The radiance lies where the reference photograph lies.
-        own_shift = truth.shifts[len(bracket) // 2]
-        (known,) = crop_common([shift_image(truth.radiance, own_shift)], shifts)
+        (known,) = crop_common([shift_image(truth.radiance, truth.shifts[alignment.reference])], shifts)
         error = radiance_error(radiance, known)
         print(f"The truth is known here: median error {error.median:.3f} stops, 95% below {error.p95:.3f}.")
 

@@ -32,9 +32,13 @@ def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, l
     brightness : (P,) float, mean pixel value of each photograph
     Raises BracketError where no source gives a time for every photograph, or none that can be true.
     """
-    lists = []
+    lists, misfits = [], []
     for name, data in texts.items():
-        entry = _text_values(name, data, names)
+        try:
+            entry = _text_values(name, data, names)
+        except BracketError as misfit:  # of no weight where another source knows all times
+            misfits.append(misfit)
+            continue
         if entry:
             written_as_fractions = re.search(rb"\b\d+/\d+\b", data)
             lists.append((f"the text file {name}", *entry, not written_as_fractions))
@@ -42,14 +46,14 @@ def find_times(path, names, texts, exif, brightness) -> tuple[np.ndarray, str, l
     found = [(source, values, may_invert) for source, _, values, may_invert in lists]
     found += [("the file names", _name_values(names), True), ("EXIF", exif if all(exif) else None, False)]
     found = [entry for entry in found if entry[1] is not None]
-    if not found:
+    if not found and not misfits:
         listed = f" {', '.join(texts)} held no line for each of the {len(names)} photographs." if texts else ""
         raise BracketError(
             f"No exposure times were found for the photographs in {path}.{listed} Put them in a text file "
             "there, one line for each photograph, as in: img_1.jpg 1/60"
         )
 
-    agreed, notes, misfits = [], [], []
+    agreed, notes = [], []
     for source, values, may_invert in found:
         try:
             times, decided = _as_seconds(source, np.array(values, dtype=np.float64), brightness, may_invert)
@@ -106,9 +110,8 @@ def _text_values(name: str, data: bytes, names: list[str]) -> tuple[bool, list[f
             named[label] = numbers[0] if numbers else None
         else:
             bare.append(numbers)
-    if any(
-        value is not None for value in named.values()
-    ):  # lists often name .ppm files where .png ones lie: the stem decides
+    # Lists often name .ppm files where .png ones lie: the stem decides.
+    if any(value is not None for value in named.values()):
         missing = [n for n in names if named.get(PurePosixPath(n).stem.lower()) is None]
         if missing:
             raise BracketError(

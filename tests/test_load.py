@@ -313,6 +313,13 @@ def test_a_source_that_can_not_be_true_gives_way_to_one_that_can_and_is_noted(sa
     assert any("t.txt" in note and "do not get brighter" in note for note in bracket.notes)
 
 
+def test_a_list_without_one_photograph_gives_way_to_a_source_that_knows_all_and_is_noted(save):
+    names = [f"img_{seconds:.4f}.png" for seconds in TIMES]
+    bracket = load_bracket(save(names, {"t.txt": f"{names[0]} 1/400"}))
+    assert bracket.source == "the file names"
+    assert any(names[1] in note for note in bracket.notes)
+
+
 def test_no_times_at_all_are_refused_with_an_example(save):
     refused(save(NAMES, {"read.txt": "taken from a tripod"}), "No exposure times", "read.txt", "1/60")
 

@@ -159,7 +159,7 @@ def make_chapel(folder) -> None:
 
 @cache
 def handheld_chapel() -> Bracket:
-    """The chapel shot from the hand: shifts of up to 20 pixels between frames, with the truth."""
+    """The chapel shot from the hand: each frame has moved by up to 20 pixels; with the truth."""
     shifts = np.random.default_rng(4).integers(-20, 21, (len(CHAPEL_TIMES), 2))
     return Camera().shoot(scene("chapel"), CHAPEL_TIMES, shifts)
 

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from hdr_helpers.align import bitmaps
+from hdr_helpers.align import bitmaps, shift_image
 from hdr_helpers.lab.figures.style import INK, THREE, headline, new_figure, pictures_figure, plain, seconds
 
 
@@ -42,12 +42,9 @@ def hand_figure(fixed, moving, shift):
 
     fixed, moving : (bright, clear) of align.bitmaps. Returns (H, W, 3) uint8.
     """
-    dx, dy = shift
-    height, width = fixed[0].shape
-    matrix = np.float32([[1, 0, dx], [0, 1, dy]])
-    bright, clear = (cv2.warpAffine(m, matrix, (width, height), flags=cv2.INTER_NEAREST) for m in moving)
+    bright, clear = (shift_image(bits, shift) for bits in moving)
     counted = (clear & fixed[1]) > 0
-    picture = np.full((height, width, 3), 205, dtype=np.uint8)
+    picture = np.full((*bright.shape, 3), 205, dtype=np.uint8)
     picture[fixed[0] > 0] = 255
     picture[~counted] = 165
     picture[counted & (fixed[0] > bright)] = (213, 94, 0)

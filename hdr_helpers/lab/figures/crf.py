@@ -98,12 +98,8 @@ def data_on_curve_figure(Z, B, g, log_E, title="Measured points fall onto one cu
     return fig
 
 
-def crf_figure(crf, title="Response curve of the camera", **others):
-    """Log inverse response of three channels, and the same the other way round.
-
-    crf : (3, 256)
-    others : name -> (3, 256), drawn thin behind it after the free gauge of each curve has been removed
-    """
+def crf_figure(crf, title="Response curve of the camera"):
+    """Log inverse response of three channels, and the same the other way round. crf : (3, 256)"""
     fig, (left, right) = new_figure(1, 2, 3.9)
     z = np.arange(256)
     for c, (name, colour, style, marker) in enumerate(CHANNELS):
@@ -116,11 +112,6 @@ def crf_figure(crf, title="Response curve of the camera", **others):
                 markevery=(8 + 12 * c, 48),
                 label=name,
             )
-            for curve, ink in zip(others.values(), (INK, ACCENT), strict=False):
-                laid_over = curve[c] + np.median((crf[c] - curve[c])[40:220])
-                ax.plot(*(z, laid_over)[::flip], color=ink, lw=1.1, ls=(0, (1, 1.5)))
-    for name, ink in zip(others, (INK, ACCENT), strict=False):
-        left.plot([], [], color=ink, ls=(0, (1, 1.5)), label=name)
     low, high = crf[:, 2].min() - 0.5, crf.max() + 0.5
     left.set(xlabel="pixel value Z", ylabel="log exposure g(Z)", xlim=(0, 255), ylim=(low, high))
     right.set(ylabel="pixel value Z", xlabel="log exposure ln(E dt)", ylim=(0, 255), xlim=(low, high))
