@@ -9,14 +9,15 @@ tonemap   radiance map                  ->  a picture in 0..1, (H, W, 3) float32
 
 import cv2
 
-from hdr_helpers.align import Alignment, align_mtb, crop_common
+from hdr_helpers.align import Alignment, align_mtb, crop_bracket, crop_common
 from hdr_helpers.crf import fitted_weights, gsolve, hat_weights, recover_crf, sample_pixels
 from hdr_helpers.load import Bracket, BracketError, Truth, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr
 from hdr_helpers.tonemap import dynamic_range_stops, tonemap, write_picture
 
-# OpenCV's tone mapping prints a note for its own developers to stderr; a student would take it for a mistake.
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+# OpenCV prints notes for its own developers to stderr, when it tone-maps and when it can't read a file; a student
+# would take them for mistakes. What it can't do it still raises.
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_FATAL)
 
 __all__ = [
     "Alignment",
@@ -25,6 +26,7 @@ __all__ = [
     "Truth",
     "align_mtb",
     "clipping",
+    "crop_bracket",
     "crop_common",
     "dynamic_range_stops",
     "fitted_weights",

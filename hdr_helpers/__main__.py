@@ -3,12 +3,11 @@
 import argparse
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from hdr_helpers.align import Alignment, align_mtb, crop_common, shift_image
+from hdr_helpers.align import Alignment, align_mtb, crop_bracket, crop_common, shift_image
 from hdr_helpers.crf import recover_crf
 from hdr_helpers.load import Bracket, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
@@ -97,8 +96,8 @@ def _run(bracket: Bracket, out: Path, options) -> None:
     else:
         alignment = align_mtb(bracket.images)
     shifts = alignment.shifts
-    aligned = replace(bracket, images=crop_common(alignment.images, shifts))
-    shares = clipping(aligned.images)
+    aligned = crop_bracket(bracket, alignment)
+    shares = clipping(aligned.images, aligned.valid)
     print(f"\n{'photograph':24} {'time (s)':>10} {'shift (px)':>11} {'too dark':>9} {'too bright':>11}")
     rows = zip(
         bracket.names, bracket.times, shifts, shares.too_dark, shares.too_bright, alignment.doubtful, strict=True
@@ -113,7 +112,7 @@ def _run(bracket: Bracket, out: Path, options) -> None:
 
     print("\nRecovering the response, merging, tone-mapping ...", flush=True)
     crf = recover_crf(aligned, lam=options.lam)
-    radiance = merge_debevec(aligned.images, aligned.times, crf)
+    radiance = merge_debevec(aligned.images, aligned.times, crf, valid=aligned.valid)
     print(f"Dynamic range of the scene: {dynamic_range_stops(radiance):.1f} stops (99.9th over 0.1th percentile).")
     picture = tonemap(radiance, options.tonemap)
 

@@ -8,10 +8,12 @@ thresholded there can be compared across exposures. In a frame that is nearly bl
 median says nothing; there another percentile, the same for both frames, is tried before giving up.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+
+from hdr_helpers.load import Bracket, in_8_bits
 
 TOLERANCE = 4  # grey levels round the threshold in which noise decides: excluded (Ward, section 2.2)
 PERCENTILES = (50, 67, 33, 80, 20, 90, 10, 95, 98)  # the median first, then ever further from it
@@ -40,7 +42,7 @@ class Alignment:
 def align_mtb(images, max_shift: int = 64) -> Alignment:
     """Shift the photographs of a bracket onto the middle one.
 
-    images : P arrays (H, W, 3) uint8, RGB, in order of exposure
+    images : P arrays (H, W, 3) uint8 or uint16, RGB, in order of exposure
     max_shift : the largest shift between neighbouring exposures that is looked for, in pixels; at most
         half the picture
 
@@ -55,7 +57,7 @@ def align_mtb(images, max_shift: int = 64) -> Alignment:
         sizes = sorted({f"{i.shape[1]} x {i.shape[0]}" for i in images})
         raise ValueError(f"All photographs must have the same size; got {' and '.join(sizes)}.")
 
-    pyramids = [_pyramid(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), max_shift) for image in images]
+    pyramids = [_pyramid(cv2.cvtColor(in_8_bits(image), cv2.COLOR_RGB2GRAY), max_shift) for image in images]
     reference = len(images) // 2
     shifts = np.zeros((len(images), 2), dtype=int)
     doubtful = np.zeros(len(images), dtype=bool)
@@ -93,6 +95,19 @@ def crop_common(images, shifts) -> tuple[np.ndarray, ...]:
     if top - bottom >= height or left - right >= width:
         raise ValueError("The aligned photographs have no part in common; check that they show one scene.")
     return tuple(image[top : height + bottom, left : width + right] for image in images)
+
+
+def crop_bracket(bracket: Bracket, alignment: Alignment) -> Bracket:
+    """The bracket with its photographs, and what is valid in them, aligned and cut to their common part.
+
+    Its truth stays behind: it lies where the photographs lay.
+    Raises ValueError where the photographs have no part in common.
+    """
+    images, valid = crop_common(alignment.images, alignment.shifts), bracket.valid
+    if valid is not None:
+        moved = [shift_image(v.view(np.uint8), s) for v, s in zip(valid, alignment.shifts, strict=True)]
+        valid = tuple(v.view(bool) for v in crop_common(moved, alignment.shifts))
+    return replace(bracket, images=images, valid=valid, truth=None)
 
 
 def bitmaps(gray, percentile: float = 50) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import scipy.linalg
 
-from hdr_helpers.load import Bracket
+from hdr_helpers.load import Bracket, in_8_bits
 
 LEVELS = 256
 MIDDLE = 128  # g[MIDDLE] = 0 fixes the gauge: equation 3 leaves g free up to a constant
@@ -39,7 +39,7 @@ def hat_weights(black: int = 0, clipped: int = LEVELS) -> np.ndarray:
 def fitted_weights(images) -> np.ndarray:
     """The hat over the pixel values that this camera can be trusted with: above black, below CLIPPED.
 
-    images : P arrays (H, W, 3) uint8, shortest exposure first
+    images : P arrays (H, W, 3) uint8 or uint16, shortest exposure first
     """
     return hat_weights(max(black_level(images), NOISE), CLIPPED)
 
@@ -55,13 +55,13 @@ def checked_weights(w) -> np.ndarray:
 def black_level(images) -> int:
     """The pixel value that stands for no light: 0 in most files, about 17 in some scans.
 
-    images : P arrays (H, W, 3) uint8, aligned, shortest exposure first
+    images : P arrays (H, W, 3) uint8 or uint16 (in 8 bits), aligned, shortest exposure first
     It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
     nothing of the scene, yet each of the short exposures would say it with conviction.
     """
     if len(images) < 2:
         return 0
-    shortest, longer = (image[::2, ::2] for image in images[:2])
+    shortest, longer = (in_8_bits(image[::2, ::2]) for image in images[:2])
     pairs = shortest.astype(np.intp) * LEVELS + longer
     joint = np.bincount(pairs.ravel(), minlength=LEVELS**2).reshape(LEVELS, LEVELS)
     count = joint.sum(axis=1)
@@ -72,13 +72,15 @@ def black_level(images) -> int:
 
 
 def whole_white(image) -> np.ndarray:
-    """A photograph, (H, W, 3) uint8, in which what is almost white and touches white is white.
+    """A photograph, (H, W, 3) uint8 or uint16, in which what is almost white and touches white is white.
 
     A clipped area in a JPEG is not all 255: here and there it reads 245, which would pass for a measurement.
     In a long exposure such a pixel says of the sun that it is hundreds of times too dim: it must not vote.
     """
-    touches_white = cv2.dilate(image, np.ones((3, 3), np.uint8)) >= CLIPPED
-    return np.where(touches_white & (image >= CLIPPED - RINGING), np.uint8(LEVELS - 1), image)
+    white = np.iinfo(image.dtype).max
+    level = white // (LEVELS - 1)
+    touches_white = cv2.dilate(image, np.ones((3, 3), np.uint8)) >= CLIPPED * level
+    return np.where(touches_white & (image >= (CLIPPED - RINGING) * level), image.dtype.type(white), image)
 
 
 def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
@@ -155,25 +157,28 @@ def _solve_reduced(Z, B, lam, w):
     return g, log_E
 
 
-def sample_pixels(images, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def sample_pixels(images, n: int, seed: int = 0, valid=None) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of n pixels spread over the picture and over its brightness.
 
     images : P arrays (H, W, 3) uint8
+    valid : (H, W) bool, the pixels that may be taken; None takes any
     Returns two (n,) integer arrays. Pixels are taken as points, never as averages: the response is not
     linear, so the mean of some values is not the value of their mean. They are drawn evenly from the
     pixels sorted by brightness, so that every pixel value is met; seeded, so that a run can be repeated.
     Raises ValueError where there are fewer than n pixels.
     """
-    height, width = images[0].shape[:2]
-    if n > height * width:
-        raise ValueError(f"{n} pixels were asked for; the photographs have {height * width}.")
+    valid = np.ones(images[0].shape[:2], dtype=bool) if valid is None else valid
+    count = np.count_nonzero(valid)
+    if n > count:
+        raise ValueError(f"{n} pixels were asked for; the photographs have {count}.")
     # A grid of some ten times as many pixels is choice enough, and large photographs stay quick to sort.
-    stride = max(1, int(np.sqrt(height * width / (10 * n))))
+    stride = max(1, int(np.sqrt(count / (10 * n))))
     # No single photograph tells the brightnesses of a high-range scene apart: their sum does.
     brightness = np.sum([image[::stride, ::stride].sum(axis=2, dtype=np.int64) for image in images], axis=0)
     rng = np.random.default_rng(seed)
     order = np.lexsort((rng.random(brightness.size), brightness.ravel()))  # equal ones in random order
-    bins = np.linspace(0, brightness.size, n + 1).astype(int)
+    order = order[valid[::stride, ::stride].ravel()[order]]
+    bins = np.linspace(0, len(order), n + 1).astype(int)
     picked = order[rng.integers(bins[:-1], bins[1:])]
     rows, cols = np.unravel_index(picked, brightness.shape)
     return rows * stride, cols * stride
@@ -182,14 +187,16 @@ def sample_pixels(images, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
 def recover_crf(bracket: Bracket, lam: float = 20.0, n: int = 20_000, seed: int = 0) -> np.ndarray:
     """The camera's log inverse response for red, green and blue.
 
-    bracket : Bracket with P >= 2 photographs
+    bracket : Bracket with P >= 2 photographs; of 16-bit ones the upper 8 bits speak, and only pixels that
+        are valid in all of them
     lam : smoothness as for a sample of 100 pixels; it is scaled with the sample, so that more pixels give
         a surer curve and not a rougher one
     n : how many pixels speak, at most
     Returns crf, (3, 256) float64 with crf[:, 128] = 0; nowhere falling.
     """
-    images = [whole_white(image) for image in bracket.images]
-    rows, cols = sample_pixels(images, min(n, images[0][..., 0].size), seed)
+    images = [whole_white(in_8_bits(image)) for image in bracket.images]
+    valid = np.ones(images[0].shape[:2], bool) if bracket.valid is None else np.logical_and.reduce(bracket.valid)
+    rows, cols = sample_pixels(images, min(n, np.count_nonzero(valid)), seed, valid)
     Z = np.stack([image[rows, cols] for image in images], axis=1)  # (N, P, 3)
     w = fitted_weights(images)
     curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
@@ -205,6 +212,7 @@ def crf_opencv(bracket: Bracket, method: str = "debevec") -> np.ndarray:
     """
     create = {"debevec": cv2.createCalibrateDebevec, "robertson": cv2.createCalibrateRobertson}[method]
     # OpenCV wants float32 times: with float64 Robertson's answers another curve, and says nothing.
-    response = create().process(list(bracket.images), bracket.times.astype(np.float32))
+    images = [in_8_bits(image) for image in bracket.images]
+    response = create().process(images, bracket.times.astype(np.float32))
     curves = np.log(np.maximum(response[:, 0].T.astype(np.float64), 1e-12))
     return curves - curves[:, MIDDLE : MIDDLE + 1]

@@ -1,29 +1,20 @@
 """Stage 1: read a bracket, the photographs of one scene at several exposure times.
 
-How exposure times are found and decided is in _times.py.
+How files are read, times are found and doubted, and borders are recognised is in the rooms of _reading/.
 """
 
-import io
-import itertools
-import re
-import zipfile
-import zlib
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from dataclasses import dataclass, replace
+from pathlib import Path
 
-import cv2
 import numpy as np
 
-from hdr_helpers._times import (
-    IMAGE_SUFFIXES,
-    TEXT_SUFFIXES,
-    BracketError,
-    exif_exposure_time,
-    find_times,
-)
+from hdr_helpers._reading import IMAGE_SUFFIXES, TEXT_SUFFIXES, BracketError
+from hdr_helpers._reading.borders import find_borders
+from hdr_helpers._reading.files import bracket_files, is_photograph, natural
+from hdr_helpers._reading.pictures import decode
+from hdr_helpers._reading.times import find_times
 
-MAX_BYTES = 4 * 2**30  # what a zip may unpack to, all files together
+__all__ = ["Bracket", "BracketError", "Truth", "in_8_bits", "load_bracket"]
 
 
 @dataclass(frozen=True)
@@ -44,11 +35,14 @@ class Truth:
 class Bracket:
     """Photographs of one scene, shortest exposure first.
 
-    images : tuple of P arrays (H, W, 3) uint8, RGB
-    times : (P,) float64, exposure times in seconds, strictly ascending
+    images : tuple of P arrays (H, W, 3), RGB, all uint8 or all uint16
+    times : (P,) float64, exposure times in seconds, strictly ascending; relative where notes say so
     names : tuple of P file names
     source : where the times came from, for people
+    places : tuple of P strings, where each time is written, such as "shutter.txt, line 2"
     notes : sentences for people: what was decided or looked odd while loading
+    valid : tuple of P arrays (H, W) bool, False where a pixel is no photograph (a border that an alignment
+        left); None where all are
     truth : Truth where the camera was a virtual one, else None
 
     Raises BracketError where these do not fit each other.
@@ -58,7 +52,9 @@ class Bracket:
     times: np.ndarray
     names: tuple[str, ...]
     source: str = "given"
+    places: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    valid: tuple[np.ndarray, ...] | None = None
     truth: Truth | None = None
 
     def __post_init__(self):
@@ -71,13 +67,12 @@ class Bracket:
         if len(times) < 2:
             raise BracketError("A bracket needs at least two photographs with different exposure times.")
         for name, image in zip(self.names, self.images, strict=True):
-            if image.shape != self.images[0].shape:
-                raise BracketError(
-                    f"{name} is {_size(image)} pixels, {self.names[0]} is {_size(self.images[0])}; "
-                    "all photographs of a bracket must have the same size."
-                )
+            _check_alike(name, image, self.names[0], self.images[0])
         if not np.all(np.isfinite(times)) or times[0] <= 0 or np.any(np.diff(times) <= 0):
             raise BracketError(f"Exposure times must be positive and strictly ascending; got {times.tolist()} seconds.")
+        shapes = [mask.shape for mask in self.valid] if self.valid is not None else []
+        if shapes and shapes != [image.shape[:2] for image in self.images]:
+            raise BracketError(f"valid must hold one mask of {self.images[0].shape[:2]} for each photograph.")
         object.__setattr__(self, "times", times)
 
     def __len__(self):
@@ -88,93 +83,91 @@ class Bracket:
         """(P,) float64, natural logarithm of the times: B in the paper, ln seconds."""
         return np.log(self.times)
 
+    def in_8_bits(self) -> "Bracket":
+        """The same bracket with the upper 8 bits of each value, for what works on 256 levels."""
+        return replace(self, images=tuple(map(in_8_bits, self.images)))
+
+
+def in_8_bits(image) -> np.ndarray:
+    """The upper 8 bits of a picture: uint8 as it is, uint16 from 0..65535 to 0..255 as uint8."""
+    return image if image.dtype == np.uint8 else (image >> 8).astype(np.uint8)
+
 
 def load_bracket(path) -> Bracket:
     """Read every photograph of a folder or zip, with its exposure time.
 
-    path : folder or .zip that holds the photographs (JPEG, PNG, TIFF, BMP or PPM) and, if the times
-        are neither in the file names nor in EXIF, one text file that lists them
+    path : folder or .zip that holds the photographs (JPEG, PNG, TIFF, BMP or PPM; 8 or 16 bits) and, if the
+        times are neither in the file names nor in EXIF, one text file that lists them
 
-    Returns a Bracket in ascending time. 16-bit files are reduced to 8 bits.
-    Raises BracketError where the photographs or the times can't be used.
+    Returns a Bracket in ascending time; its notes say what was decided. Where EXIF says that ISO or aperture
+    change, times are exposures: t ISO / N^2.
+    Raises BracketError where the photographs or the times can't be used; nothing is loaded then.
     """
     path = Path(path)
-    files = _zip_files(path) if zipfile.is_zipfile(path) else _folder_files(path)
-    names = sorted((n for n in files if n.lower().endswith(IMAGE_SUFFIXES)), key=_natural)
+    files = bracket_files(path)
+    names = sorted(filter(is_photograph, files), key=natural)
     if len(names) < 2:
         raise BracketError(
-            f"{path} holds {len(names)} photographs; a bracket needs at least two of "
+            f"{path} holds {len(names)} photograph{'s' * (len(names) != 1)}; a bracket needs at least two of "
             f"{', '.join(IMAGE_SUFFIXES)} in one folder. HEIC and raw files have to be exported as JPEG first."
         )
-    images, exif = zip(*(_decode(name, files[name]()) for name in names), strict=True)
     texts = {n: files[n]() for n in sorted(files) if n.lower().endswith(TEXT_SUFFIXES)}
-    brightness = np.array([image[::4, ::4].mean() for image in images])
-    times, source, notes = find_times(path, names, texts, exif, brightness)
-
-    order = np.argsort(times, kind="stable")
-    for a, b in itertools.pairwise(order):
-        if times[a] == times[b]:
-            raise BracketError(
-                f"{names[a]} and {names[b]} have the same exposure time, {times[a]:g} s, by {source}; "
-                "keep one of them, or correct its time."
-            )
-    return Bracket(tuple(images[i] for i in order), times[order], tuple(names[i] for i in order), source, tuple(notes))
-
-
-# ---------------------------------------------------------------------------------------- files
-
-
-def _folder_files(path: Path) -> dict[str, Callable[[], bytes]]:
-    if not path.is_dir():
-        state = "is neither a folder nor a zip" if path.exists() else "does not exist"
-        raise BracketError(f"{path} {state}; give the folder or zip that holds the photographs.")
-    return {p.name: p.read_bytes for p in path.iterdir() if p.is_file() and not p.name.startswith(".")}
-
-
-def _zip_files(path: Path) -> dict[str, Callable[[], bytes]]:
-    """The files of the one folder inside the zip that holds the most photographs, read in memory."""
-    archive = zipfile.ZipFile(io.BytesIO(path.read_bytes()))
-    members = [m for m in archive.infolist() if not m.is_dir() and "__MACOSX" not in m.filename]
-    total = sum(m.file_size for m in members)
-    if total > MAX_BYTES:
-        raise BracketError(f"{path} unpacks to {total / 2**30:.1f} GB; up to {MAX_BYTES / 2**30:.0f} GB are read.")
-    photographs = [PurePosixPath(m.filename).parent for m in members
-                   if m.filename.lower().endswith(IMAGE_SUFFIXES)]  # fmt: skip
-    home = max(photographs, key=photographs.count, default=PurePosixPath("."))
-    return {
-        p.name: lambda m=m: _unpack(archive, m, path)
-        for m in members
-        if (p := PurePosixPath(m.filename)).parent == home and not p.name.startswith(".")
-    }
-
-
-def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path) -> bytes:
     try:
-        return archive.read(member)
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError) as problem:
+        photographs = []
+        for name in names:
+            photographs.append(decode(name, files[name]()))
+            _check_alike(name, photographs[-1].image, names[0], photographs[0].image)
+        small = [in_8_bits(p.image) for p in photographs]
+    except MemoryError:
         raise BracketError(
-            f"{member.filename} can't be unpacked from {path} ({problem}); make the zip again, without a password."
+            f"The {len(names)} photographs in {path} do not fit into memory; scale them down, or take fewer."
         ) from None
 
+    times = find_times(path, names, texts, [p.exif for p in photographs], np.array([_histogram(i) for i in small]))
+    order = np.argsort(times.seconds)
+    valid, borders = _valid([small[i] for i in order], [photographs[i].opaque for i in order])
+    return Bracket(
+        images=tuple(photographs[i].image for i in order),
+        times=times.seconds[order],
+        names=tuple(names[i] for i in order),
+        source=times.source,
+        places=tuple(times.places[i] for i in order),
+        notes=(*times.notes, *borders),
+        valid=valid,
+    )
 
-def _decode(name: str, data: bytes) -> tuple[np.ndarray, float | None]:
-    """One photograph as RGB uint8, upright, and its EXIF exposure time in seconds where it has one."""
-    try:
-        image, kinds, metadata = cv2.imdecodeWithMetadata(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:
-        image = None
-    if image is None:
+
+def _histogram(image) -> np.ndarray:
+    """(256,) counts of the green values, the channel with the least noise, of about a million pixels."""
+    stride = max(1, int(np.sqrt(image[..., 1].size / 1e6)))
+    return np.bincount(image[::stride, ::stride, 1].ravel(), minlength=256)
+
+
+def _valid(images, opaque) -> tuple[tuple[np.ndarray, ...] | None, list[str]]:
+    """Bracket.valid from borders and transparency, and a note where there is something to say."""
+    masks = []
+    for border, solid in zip(find_borders(images), opaque, strict=True):
+        given = [mask for mask in (border, solid) if mask is not None]
+        masks.append(np.logical_and.reduce(given) if given else None)
+    marked = sum(mask is not None for mask in masks)
+    if not marked:
+        return None, []
+    everywhere = np.ones(images[0].shape[:2], dtype=bool)
+    masks = tuple(everywhere if mask is None else mask for mask in masks)
+    share = 1 - np.logical_and.reduce(masks).mean()
+    return masks, [
+        f"{marked} of {len(masks)} photographs have borders that are no photograph, {share:.1%} of the frame "
+        "altogether; they are left out."
+    ]
+
+
+def _check_alike(name, image, first_name, first) -> None:
+    if image.shape != first.shape or image.dtype != first.dtype:
         raise BracketError(
-            f"{name} can't be read as a picture; JPEG, PNG, TIFF, BMP and PPM files of 8 or 16 bits can."
+            f"{name} is {_form(image)}, {first_name} is {_form(first)}; "
+            "all photographs of a bracket must have the same size and depth."
         )
-    exif = {int(k): bytes(m) for k, m in zip(kinds, metadata, strict=False)}.get(cv2.IMAGE_METADATA_EXIF)
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB), exif_exposure_time(exif) if exif else None
 
 
-def _size(image: np.ndarray) -> str:
-    return f"{image.shape[1]} x {image.shape[0]}"
-
-
-def _natural(name: str) -> list:
-    """Sort key under which img2 comes before img10."""
-    return [int(part) if part.isdigit() else part.lower() for part in re.split(r"(\d+)", name)]
+def _form(image: np.ndarray) -> str:
+    return f"{image.shape[1]} x {image.shape[0]} pixels of {8 * image.itemsize} bits"

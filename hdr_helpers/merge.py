@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from hdr_helpers.crf import LEVELS, checked_weights, fitted_weights, whole_white
+from hdr_helpers.load import in_8_bits
 
 LAST_RESORT = 1e-5  # of the largest weight: decides only where no photograph has any other weight
 LEAST = 1e-9  # of the largest weight: no sum of weights is 0, whatever the values
@@ -35,54 +36,69 @@ class Clipping:
     everywhere_bright: float
 
 
-def clipping(images) -> Clipping:
+def clipping(images, valid=None) -> Clipping:
     """How much of each photograph is too dark or too bright to be used, and how much in all of them.
 
-    images : P arrays (H, W, 3) uint8, shortest exposure first. Usable is what fitted_weights gives a weight.
+    images : P arrays (H, W, 3) uint8 or uint16, shortest exposure first
+    valid : P arrays (H, W) bool, the pixels that count, or None for all
+    Usable is what fitted_weights gives a weight. Shares are of the pixels that are valid in every photograph.
     """
+    inside = np.s_[:, :] if valid is None else np.logical_and.reduce(valid)
+    pixels = [in_8_bits(image)[inside].reshape(-1, 3) for image in images]
     usable = np.flatnonzero(fitted_weights(images))
-    dark = np.array([(image < usable[0]).any(axis=2) for image in images])
-    bright = np.array([(image > usable[-1]).any(axis=2) for image in images])
-    shares = dark.mean(axis=(1, 2)), bright.mean(axis=(1, 2))
+    dark = np.array([(values < usable[0]).any(axis=1) for values in pixels])
+    bright = np.array([(values > usable[-1]).any(axis=1) for values in pixels])
+    shares = dark.mean(axis=1), bright.mean(axis=1)
     return Clipping(*shares, float(dark.all(axis=0).mean()), float(bright.all(axis=0).mean()))
 
 
-def merge_debevec(images, times, crf, w=None) -> np.ndarray:
+def merge_debevec(images, times, crf, w=None, valid=None) -> np.ndarray:
     """Radiance map from a bracket and the camera's response (equation 6, one channel at a time).
 
-    images : P arrays (H, W, 3) uint8, RGB
+    images : P arrays (H, W, 3), RGB, all uint8 or all uint16
     times : (P,) exposure times in seconds
-    crf : (3, 256) float, log inverse response of each channel
+    crf : (3, 256) float, log inverse response of each channel; for 16 bits it is interpolated
     w : (256,) float, weight of each pixel value; None takes fitted_weights(images)
+    valid : P arrays (H, W) bool, False where a photograph has no say; None lets all speak everywhere
 
     Returns radiance, (H, W, 3) float32, RGB, relative, finite and positive everywhere. A pixel that is
     clipped in every photograph gets what the shortest exposure says, one that is black in every photograph
-    what the longest says: the nearest bound, so that the brightest part of a scene stays the brightest.
+    what the longest says: the nearest bound, so that the brightest part of a scene stays the brightest. Where
+    no photograph is valid it is as dark as the darkest pixel.
     Raises ValueError where shapes or values don't fit.
     """
     images, times, crf = list(images), np.asarray(times, dtype=np.float64), np.asarray(crf, dtype=np.float64)
     if len(images) != len(times) or not len(images):
         raise ValueError(f"One exposure time for each photograph is needed; got {len(times)} for {len(images)}.")
     for image in images:
-        if image.dtype != np.uint8 or image.shape != images[0].shape or image.shape[2:] != (3,):
-            raise ValueError(f"Images must be uint8 of one size (H, W, 3); got {image.dtype} {image.shape}.")
+        alike = image.dtype == images[0].dtype and image.shape == images[0].shape
+        if image.dtype not in (np.uint8, np.uint16) or not alike or image.shape[2:] != (3,):
+            raise ValueError(f"Images must be uint8 or uint16 of one size (H, W, 3); got {image.dtype} {image.shape}.")
     if not (np.all(np.isfinite(times)) and np.all(times > 0)):
         raise ValueError(f"Exposure times must be positive seconds; got {times.tolist()}.")
     if crf.shape != (3, LEVELS) or not np.all(np.isfinite(crf)):
         raise ValueError(f"crf must be (3, {LEVELS}) and finite; got {crf.shape}.")
+    if valid is not None and [np.shape(mask) for mask in valid] != [image.shape[:2] for image in images]:
+        raise ValueError(f"valid must hold one mask of {images[0].shape[:2]} for each photograph.")
     shortest_first = [images[i] for i in np.argsort(times)]
     w = fitted_weights(shortest_first) if w is None else checked_weights(w)
     # In the shortest exposure even a doubtful value is better than none: nothing sees more.
     settled = [image if t == times.min() else whole_white(image) for image, t in zip(images, times, strict=True)]
-    return _merge_by_tables(settled, *_tables(times, crf, w))
+    values = np.iinfo(images[0].dtype).max + 1
+    radiance = _merge_by_tables(settled, *_tables(times, crf, w, values), valid)
+    if valid is not None and not (somewhere := np.logical_or.reduce(valid)).all():
+        radiance[~somewhere] = radiance[somewhere].min(axis=0) if somewhere.any() else 1
+    return radiance
 
 
-def _tables(times, crf, w) -> tuple[np.ndarray, np.ndarray]:
-    """w(z) (g(z) - ln dt) and w(z) for every photograph, each (P, 1, 256, 3) float32 as cv2.LUT wants it."""
+def _tables(times, crf, w, values: int) -> tuple[np.ndarray, np.ndarray]:
+    """w(z) (g(z) - ln dt) and w(z) for every photograph, each (P, 1, values, 3) float32 as cv2.LUT wants it."""
+    z = np.linspace(0, LEVELS - 1, values)  # 256 values, or 65,536 between them
+    crf, w = np.array([np.interp(z, np.arange(LEVELS), g) for g in crf]), np.interp(z, np.arange(LEVELS), w)
     weights = np.maximum(np.tile(w, (len(times), 1)), LEAST * w.max())
     # Where no photograph is usable the nearest bound decides: of the bright values the shortest exposure's,
     # of the dark ones the longest's.
-    bright, dark = np.s_[np.argmin(times), LEVELS // 2 :], np.s_[np.argmax(times), : LEVELS // 2]
+    bright, dark = np.s_[np.argmin(times), values // 2 :], np.s_[np.argmax(times), : values // 2]
     for side in (bright, dark):
         weights[side] = np.maximum(weights[side], LAST_RESORT * w.max())
     weighted = weights[..., None] * (crf.T - np.log(times)[:, None, None])
@@ -90,16 +106,17 @@ def _tables(times, crf, w) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))
 
 
-def _merge_by_tables(images, weighted, weights) -> np.ndarray:
-    """Look up and add, some rows at a time; equation 6 and the exponential at the end."""
+def _merge_by_tables(images, weighted, weights, valid) -> np.ndarray:
+    """Look up and add, some rows at a time; equation 6 and the exponential at the end. NaN where none is valid."""
     radiance = np.empty(images[0].shape, dtype=np.float32)
     for top in range(0, len(radiance), TILE_ROWS):
         rows = np.s_[top : top + TILE_ROWS]
-        numerator = cv2.LUT(images[0][rows], weighted[0])
-        denominator = cv2.LUT(images[0][rows], weights[0])
-        for image, table, weight in zip(images[1:], weighted[1:], weights[1:], strict=True):
-            cv2.accumulate(cv2.LUT(image[rows], table), numerator)
-            cv2.accumulate(cv2.LUT(image[rows], weight), denominator)
+        numerator = np.zeros_like(radiance[rows])
+        denominator = np.zeros_like(radiance[rows])
+        for j, image in enumerate(images):
+            mask = None if valid is None else valid[j][rows].view(np.uint8)
+            cv2.accumulate(cv2.LUT(image[rows], weighted[j]), numerator, mask)
+            cv2.accumulate(cv2.LUT(image[rows], weights[j]), denominator, mask)
         cv2.exp(cv2.divide(numerator, denominator), radiance[rows])
     return radiance
 
@@ -111,7 +128,7 @@ def merge_opencv(images, times, crf=None) -> np.ndarray:
     the result may be 0 or not finite: that is OpenCV's own answer. Without crf OpenCV takes the camera for a
     linear one.
     """
-    images, merge = [np.ascontiguousarray(image) for image in images], cv2.createMergeDebevec()
+    images, merge = [np.ascontiguousarray(in_8_bits(image)) for image in images], cv2.createMergeDebevec()
     times = np.asarray(times, dtype=np.float32)  # with float64 it answers zeros and infinities, and says nothing
     if crf is None:
         return merge.process(images, times)

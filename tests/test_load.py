@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hdr_helpers._times import exif_exposure_time
+from hdr_helpers._reading.pictures import Exif, read_exif
 from hdr_helpers.load import Bracket, BracketError, load_bracket
 
 NAMES = ("a_1.png", "a_2.png", "a_3.png", "a_4.png")
@@ -141,25 +141,29 @@ def test_exif_gives_the_times_in_both_byte_orders(tmp_path, small_bracket, order
 @pytest.mark.parametrize("cut", [0, 2, 7, 9, 30, 50, 60])
 def test_exif_cut_short_gives_no_time(cut):
     block = exif_block(1, 3, "<")
-    assert exif_exposure_time(block) == 1 / 3
-    assert exif_exposure_time(block[:cut]) is None
+    assert read_exif(block).seconds == 1 / 3
+    assert read_exif(block[:cut])._replace(orientation=None) == Exif()
 
 
 @pytest.mark.parametrize("fraction", [(0, 1), (1, 0), (0, 0)])
 def test_exif_without_a_positive_time_gives_none(fraction):
-    assert exif_exposure_time(exif_block(*fraction, ">")) is None
+    assert read_exif(exif_block(*fraction, ">")).seconds is None
 
 
 def test_two_sources_that_disagree_are_noted_with_both_values(save):
-    bracket = load_bracket(save(("a_0.01.png", "a_0.1.png", "a_1.0.png"), {"t.txt": "0.01 0.25 1"}))
+    names = ("a_0.0025.png", "a_0.0167.png", "a_0.12.png", "a_0.6.png")
+    bracket = load_bracket(save(names, {"t.txt": "1/400 1/60 1/10 0.6"}))
     (note,) = bracket.notes
-    assert "a_0.1.png" in note
-    assert "0.25 s" in note and "0.1 s" in note
-    assert bracket.times[1] == 0.25
+    assert "a_0.12.png" in note
+    assert "0.1 s by the text file t.txt" in note and "0.12 s by the file names" in note
+    assert bracket.times[2] == 0.1
 
 
-def test_a_common_factor_between_two_sources_is_not_noted(save):
-    assert load_bracket(save(("a_0.01.png", "a_0.1.png", "a_1.0.png"), {"t.txt": "0.02 0.2 2"})).notes == ()
+def test_a_common_factor_between_two_sources_means_relative_times_and_is_said_once(save):
+    bracket = load_bracket(save(("a_0.01.png", "a_0.07.png", "a_0.4.png"), {"t.txt": "0.02 0.14 0.8"}))
+    (note,) = bracket.notes
+    assert "relative" in note and "0.5 times" in note
+    np.testing.assert_allclose(bracket.times, (0.02, 0.14, 0.8))
 
 
 @pytest.mark.parametrize("text", ["5", "null", '"a word"', "[1, 2]", "{", "{}"])
@@ -207,12 +211,14 @@ def test_a_camera_held_upright_gives_upright_photographs(tmp_path, small_bracket
     assert np.array_equal(load_bracket(tmp_path).images[0], np.rot90(small_bracket.images[0], -1))
 
 
-def test_16_bit_photographs_give_their_upper_8_bits(save, small_bracket):
+def test_16_bit_photographs_keep_all_16_bits_and_give_the_upper_8_on_request(save, small_bracket):
     folder = save(NAMES, {"t.txt": LISTED})
     for name, image in zip(NAMES, small_bracket.images, strict=False):
-        cv2.imwrite(str(folder / name), image[..., ::-1].astype(np.uint16) * 256 + 255)
-    for image, expected in zip(load_bracket(folder).images, small_bracket.images, strict=False):
-        assert np.array_equal(image, expected)
+        cv2.imwrite(str(folder / name), image[..., ::-1].astype(np.uint16) * 256 + 77)
+    bracket = load_bracket(folder)
+    for image, upper, expected in zip(bracket.images, bracket.in_8_bits().images, small_bracket.images, strict=False):
+        assert np.array_equal(image, expected.astype(np.uint16) * 256 + 77)
+        assert upper.dtype == np.uint8 and np.array_equal(upper, expected)
 
 
 # -------------------------------------------------------------------------------------- bad input
@@ -244,7 +250,7 @@ def test_an_empty_zip_is_refused(tmp_path):
 
 
 def test_a_zip_that_unpacks_to_too_much_is_refused(save, tmp_path, monkeypatch):
-    monkeypatch.setattr("hdr_helpers.load.MAX_BYTES", 1000)
+    monkeypatch.setattr("hdr_helpers._reading.files.MAX_BYTES", 100_000)
     refused(zipped(save(NAMES), tmp_path / "bomb.zip"), "bomb.zip", "unpacks to")
 
 
@@ -257,7 +263,7 @@ def test_a_damaged_zip_is_refused(save, tmp_path):
 
 
 def test_a_single_photograph_is_refused(save):
-    refused(save(NAMES[:1], {"t.txt": "1"}), "1 photographs", "at least two")
+    refused(save(NAMES[:1], {"t.txt": "1"}), "1 photograph;", "at least two")
 
 
 @pytest.mark.parametrize("data", [b"", b"not a picture", b"\xff\xd8\xff\xe0 cut short"])
@@ -288,7 +294,7 @@ def test_a_list_with_a_time_that_is_no_number_is_refused_by_name(save):
 
 
 def test_equal_times_are_refused_with_both_names(save):
-    refused(save(NAMES, {"t.txt": "1/400 1/60 1/60 0.6"}), "a_2.png", "a_3.png", "0.0166667 s")
+    refused(save(NAMES, {"t.txt": "1/400 1/60 1/60 0.6"}), "a_2.png", "a_3.png", "0.01667 s", "a_3.png looks 6")
 
 
 def test_times_that_do_not_fit_the_brightness_are_refused(save):

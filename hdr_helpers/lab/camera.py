@@ -108,7 +108,7 @@ class Camera:
         ]
         truth = Truth(np.asarray(radiance[inside], dtype=np.float32), self.crf(), moves)
         names = tuple(f"frame_{frame:02d}" for frame in range(len(times)))
-        return Bracket(tuple(images), np.array(times), names, "the virtual camera", (), truth)
+        return Bracket(tuple(images), np.array(times), names, source="the virtual camera", truth=truth)
 
 
 def sensitivity(radiance, shortest: float) -> float:

@@ -42,7 +42,8 @@ def _explorer(draw, controls: dict, extra=()):
 
 def exposure_explorer(bracket):
     """One photograph of the bracket at a time, its unusable pixels striped, with its histogram."""
-    drawn = {t: jpeg_bytes(histogram_figure(i, t)) for i, t in zip(bracket.images, bracket.times, strict=True)}
+    images = bracket.in_8_bits().images
+    drawn = {t: jpeg_bytes(histogram_figure(i, t)) for i, t in zip(images, bracket.times, strict=True)}
     options = [(seconds(t), t) for t in bracket.times]
     slider = widgets.SelectionSlider(
         options=options, value=bracket.times[len(options) // 2], description="exposure time", **CONTROL

@@ -25,7 +25,7 @@ TOO_DARK, TOO_BRIGHT = NOISE + 1, CLIPPED  # pixel values below and from which a
 
 def strip_figure(bracket, title=None, cols=5):
     """All photographs of a bracket as a contact sheet."""
-    small = [cv2.resize(i, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for i in bracket.images]
+    small = [cv2.resize(i, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for i in bracket.in_8_bits().images]
     return pictures_figure(small, [seconds(t) for t in bracket.times], cols, title)
 
 
@@ -61,6 +61,7 @@ def histogram_figure(image, time):
 
 def pixel_figure(bracket, points):
     """Three pixels followed through all exposures. points : name -> (row, column)"""
+    bracket = bracket.in_8_bits()
     fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.3, 1])
     bare(left)
     left.imshow(bracket.images[len(bracket) // 2 + 1])

@@ -1,0 +1,203 @@
+"""Exposure times of a bracket: which source to believe, and what its numbers mean.
+
+Sources, in order of trust: a text file that names the photographs, a text file that lists one number for
+each, times spelled in the file names, EXIF. (Someone wrote a text file for this very set; names and EXIF are
+cameras' roundings.) The photographs have the last word: where they contradict a source, one that they bear
+out takes its place. They also tell seconds from 1/seconds, because a longer exposure is brighter.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hdr_helpers._reading import BracketError
+from hdr_helpers._reading.evidence import doubts, looks_brighter, measure
+from hdr_helpers._reading.lists import EV, OPEN, SECONDS, Listed, name_values, text_values, whole_number_names
+from hdr_helpers._reading.pictures import Exif
+
+ROUNDING = 0.05  # cameras print rounded times; two sources that differ by more are both reported
+MIN_AGREEMENT = 0.5  # of the order of times with the order of brightness: 1 is the same, -1 reversed
+EV_STEP, EV_REACH = 0.25, 24  # EV lists have no finer steps, and no camera reaches further
+
+
+class Times(NamedTuple):
+    """seconds : (P,) float64; places : where each is written; source : for people; notes : sentences"""
+
+    seconds: np.ndarray
+    places: tuple[str, ...]
+    source: str
+    notes: list[str]
+
+
+class _Candidate(NamedTuple):
+    times: Times
+    doubts: list[str]
+
+
+def find_times(path, names, texts, exif: list[Exif], histograms) -> Times:
+    """Exposure times in the order of names.
+
+    path : of the bracket, for messages; names : P file names
+    texts : dict from the name of a text file to its bytes
+    exif : what EXIF says of each photograph
+    histograms : (P, 256) counts of each pixel value, of each photograph
+    Raises BracketError where no source gives a time for every photograph, or none that can be true.
+    """
+    camera = _Camera(names, exif)
+    sources, misfits = _sources(texts, names, camera)
+    candidates = []
+    for source, listed in sources:
+        try:
+            candidates.append(_judge(source, listed, camera, names, histograms))
+        except BracketError as misfit:
+            misfits.append(misfit)
+    if not candidates and (listed := whole_number_names(names)):
+        candidate = _judge("the file names", listed, camera, names, histograms)
+        candidates += [candidate] * (not candidate.doubts)
+    if not candidates:
+        raise misfits[0] if misfits else _nothing(path, names, texts)
+
+    first = int(np.argmin([len(c.doubts) for c in candidates]))  # of those with the fewest
+    chosen = candidates.pop(first)
+    notes = [*chosen.times.notes, *chosen.doubts, *map(str, misfits)]
+    for trusted in candidates[:first]:
+        notes.append(f"{_capital(trusted.times.source)} is set aside. {trusted.doubts[0]}")
+    for other in candidates:
+        notes += _differences(names, chosen.times, other.times)
+    return chosen.times._replace(notes=notes)
+
+
+def _sources(texts, names, camera) -> tuple[list[tuple[str, Listed]], list[BracketError]]:
+    """All that is written, the most trusted first, and what was written but does not fit the photographs."""
+    lists, misfits = [], []
+    for file, data in texts.items():
+        try:
+            listed = text_values(file, data, names)
+        except BracketError as misfit:  # of no weight where another source knows all times
+            misfits.append(misfit)
+            continue
+        if listed:
+            lists.append((f"the text file {file}", listed))
+    lists.sort(key=lambda entry: not entry[1].named)
+    others = [("the file names", name_values(names)), ("EXIF", camera.listed)]
+    return lists + [(source, listed) for source, listed in others if listed], misfits
+
+
+def _nothing(path, names, texts) -> BracketError:
+    looked = f" {', '.join(texts)} held no line for each of the {len(names)} photographs." if texts else ""
+    return BracketError(
+        f"No exposure times were found for the photographs in {path}.{looked} Put them in a text file "
+        f"there, one line for each photograph, as in: {names[0]} 1/60"
+    )
+
+
+class _Camera:
+    """What EXIF says: times, and the gain by which ISO and aperture change the exposure.
+
+    listed : the times, as a source, where all photographs have one, else None
+    gains : (P,) float64, ISO / N^2 relative to its smallest, or None where neither changes
+    note : the sentence that says so
+    """
+
+    def __init__(self, names, exif):
+        seconds = tuple(e.seconds for e in exif)
+        self.listed = Listed(seconds, tuple(f"EXIF of {n}" for n in names), SECONDS) if all(seconds) else None
+        gains, changes = np.ones(len(names)), []
+        for what, values in (("ISO", [e.iso for e in exif]), ("the aperture", [e.f_number for e in exif])):
+            if all(values) and max(values) > min(values) * (1 + ROUNDING):
+                gains *= np.array(values) if what == "ISO" else np.array(values) ** -2.0
+                mark = "" if what == "ISO" else "f/"
+                changes.append(f"{what} changes from {mark}{min(values):g} to {mark}{max(values):g}")
+        self.gains = gains / gains.min() if changes else None
+        self.note = (
+            f"{_capital(' and '.join(changes))}; each time is multiplied by ISO / N^2, "
+            "relative to the least sensitive photograph, and stands for the exposure."
+        )
+
+
+def _judge(source, listed, camera, names, histograms) -> _Candidate:
+    """Turn what is written into seconds of exposure, and ask the photographs what they think of it.
+
+    Raises BracketError where it can't be true.
+    """
+    values, notes = np.array(listed.values, dtype=np.float64), []
+    gains = camera.gains
+    if gains is not None and camera.listed and listed is not camera.listed:
+        shutter = np.array(camera.listed.values)
+        if not _same(values, shutter) and not _same(1 / values, shutter) and _same(values, shutter * gains):
+            gains = None  # the list holds exposures already
+    if gains is None:
+        gains = np.ones(len(values))
+    else:
+        notes.append(camera.note)
+
+    brightness = histograms @ np.arange(256) / histograms.sum(axis=1)
+    if listed.kind == EV or (listed.kind == OPEN and values.min() <= 0 and _may_be_stops(values, brightness)):
+        values = np.exp2(values)
+        notes.append(f"{_capital(source)} holds EV steps; times are relative, 2 to the EV.")
+    elif values.min() <= 0:
+        i = int(np.argmin(values))
+        raise BracketError(
+            f"{_capital(source)} gives {values[i]:g} s for {names[i]}; a time is positive, as in: {names[i]} 1/60"
+        )
+    elif listed.kind == OPEN and _agreement(values * gains, brightness) <= -MIN_AGREEMENT:
+        values = 1 / values
+        notes.append(f"{_capital(source)} reads as 1/seconds: the photographs get darker as its numbers grow.")
+    values = values * gains
+    if _agreement(values, brightness) < MIN_AGREEMENT:
+        raise BracketError(
+            f"By {source} the photographs do not get brighter as the exposure gets longer; check which time "
+            "belongs to which photograph, and that ISO and aperture were fixed."
+        )
+
+    order = np.argsort(values, kind="stable")
+    named, histograms = [names[i] for i in order], histograms[order]
+    for i in np.flatnonzero(np.diff(values[order]) == 0):
+        ratio = looks_brighter(histograms[i], histograms[i + 1])
+        looks = "they look alike" if 0.9 < ratio < 1.1 else f"{named[i + 1]} looks {ratio:.2g} times as bright"
+        raise BracketError(
+            f"{named[i]} and {named[i + 1]} have the same exposure time, {values[order[i]]:.4g} s, by {source}"
+            f"{f', and {looks}' if np.isfinite(ratio) else ''}; keep one of them, or correct its time."
+        )
+    evidence = measure(histograms, values[order])
+    times = Times(values, listed.places, source, notes)
+    return _Candidate(times, doubts(evidence, values[order], named, source))
+
+
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
+def _agreement(values, brightness) -> float:
+    """1 where the larger value is the brighter photograph for every pair, -1 where for none."""
+    i, j = np.triu_indices(len(values), 1)
+    return float(np.mean(np.sign(values[j] - values[i]) * np.sign(brightness[j] - brightness[i])))
+
+
+def _may_be_stops(values, brightness) -> bool:
+    """Whether numbers that aren't all positive are EV steps, and not times with a slip of the pen."""
+    steps = np.diff(np.sort(values))
+    return (
+        steps.min() >= EV_STEP and np.abs(values).max() <= EV_REACH and _agreement(values, brightness) >= MIN_AGREEMENT
+    )
+
+
+def _same(a, b) -> bool:
+    """Whether two lists of positive numbers agree but for one factor and for rounding."""
+    ratio = np.log(np.abs(a)) - np.log(b)
+    return bool(np.ptp(ratio) < 2 * ROUNDING)
+
+
+def _differences(names, chosen: Times, other: Times) -> list[str]:
+    """Where another source gives other times, a sentence with both."""
+    ratio = other.seconds / chosen.seconds
+    factor = np.median(ratio)
+    notes = [
+        f"{names[i]}: {chosen.seconds[i]:.4g} s by {chosen.source}, {other.seconds[i]:.4g} s by {other.source}."
+        for i in np.flatnonzero(np.abs(ratio / factor - 1) > ROUNDING)
+    ]
+    if len(notes) < len(names) / 2 and abs(factor - 1) > 2 * ROUNDING:
+        notes.append(
+            f"The times are relative: those of {other.source} are {factor:.3g} times those of {chosen.source}."
+        )
+    return notes
