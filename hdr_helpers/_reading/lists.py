@@ -19,6 +19,8 @@ SEPARATOR = r"[\s,;:=|\"']"  # what may stand between a name and its number
 SUFFIX = "|".join(map(re.escape, IMAGE_SUFFIXES))
 UNITS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "秒": 1.0, "ms": 1e-3, "毫秒": 1e-3, "": 1.0}
 UNIT = "(" + "|".join(sorted(filter(None, UNITS), key=len, reverse=True)) + ")"
+TIME_TITLE = re.compile(r"shutter|time|expos|speed|sec|^t$", re.IGNORECASE)
+OTHER_TITLE = re.compile(r"f.?stop|f.?num|^f$|apert|iso|gain|^nd", re.IGNORECASE)
 MAX_TEXT = 2**20  # bytes; a longer file is no list of exposure times
 
 
@@ -50,12 +52,14 @@ def text_values(file: str, data: bytes, names: list[str]) -> Listed | None:
     # 1/60 can only be seconds; 0.5 and 60 may be anything.
     kind = SECONDS if re.search(r"(?<![\d/])\d+/\d+(?![\d/])", " ".join(row for _, row in rows)) else OPEN
     if any(numbers for _, _, numbers in named):
-        values, places = _by_name(file, named, names)
+        values, places = _by_name(file, named, names, _titles(text))
         return Listed(values, places, kind)
     if named or not all(numbers for _, numbers in bare):  # words that are neither names nor numbers
         return None
     flat = [(place, value) for place, numbers in bare for value in numbers]
     by_row = [[(place, value) for value in numbers] for place, numbers in bare]
+    if len(flat) == len(names) + 1 and flat[0][1] == len(names):  # how many follow
+        del flat[0]
     chosen = next((row for row in (flat, *by_row) if len(row) == len(names)), None)
     if chosen is None:
         return None
@@ -63,7 +67,7 @@ def text_values(file: str, data: bytes, names: list[str]) -> Listed | None:
     return Listed(values, tuple(f"{file}{place}" for place in places), kind, named=False)
 
 
-def _by_name(file, named, names) -> tuple[tuple[float, ...], tuple[str, ...]]:
+def _by_name(file, named, names, titles) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """Each photograph's number, by its name, or by its stem: lists often name .ppm where .png files lie."""
     rows = {}
     for place, label, numbers in named:
@@ -85,10 +89,32 @@ def _by_name(file, named, names) -> tuple[tuple[float, ...], tuple[str, ...]]:
             f"{file} lists {next(iter(rows))}, which is not among the photographs; add the photograph, or "
             "delete its line."
         )
-    # Aperture or ISO may stand in front: the first column that changes holds the times.
     columns = list(zip(*(numbers for _, numbers in found.values()), strict=False))
-    values = next((column for column in columns if len(set(column)) > 1), columns[0])
-    return values, tuple(f"{file}{place}" for place, _ in found.values())
+    return columns[_time_column(file, columns, titles)], tuple(f"{file}{place}" for place, _ in found.values())
+
+
+def _time_column(file, columns, titles) -> int:
+    """Which column holds the times: by its title, else the first that changes. Aperture or ISO may stand before it."""
+    changing = [i for i, column in enumerate(columns) if len(set(column)) > 1]
+    if len(titles) == len(columns):
+        times = [i for i in changing if TIME_TITLE.search(titles[i])]
+        for i in changing:
+            if i not in times and OTHER_TITLE.search(titles[i]):
+                raise BracketError(
+                    f"{file} lists {titles[i]} that changes from photograph to photograph; list one number for each "
+                    "instead, its exposure t ISO / N^2."
+                )
+        changing = times or changing
+    return changing[0] if changing else 0
+
+
+def _titles(text: str) -> list[str]:
+    """The titles of the columns after the name, from a heading such as "# Filename shutter iso", or none."""
+    for line in text.splitlines():
+        words = [word for word in re.split(rf"{SEPARATOR}+", line.strip("# \t\r")) if word]
+        if len(words) > 1 and all(_number(word) is None for word in words) and any(map(TIME_TITLE.search, words)):
+            return words[1:]
+    return []
 
 
 def _decoded(data: bytes) -> str:

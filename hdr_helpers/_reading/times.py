@@ -154,7 +154,7 @@ def _judge(source, listed, camera, names, histograms) -> _Candidate:
     named, histograms = [names[i] for i in order], histograms[order]
     for i in np.flatnonzero(np.diff(values[order]) == 0):
         ratio = looks_brighter(histograms[i], histograms[i + 1])
-        looks = "they look alike" if 0.9 < ratio < 1.1 else f"{named[i + 1]} looks {ratio:.2g} times as bright"
+        looks = "they look alike" if 0.9 < ratio < 1.1 else f"{named[i + 1]} looks brighter than the other"
         raise BracketError(
             f"{named[i]} and {named[i + 1]} have the same exposure time, {values[order[i]]:.4g} s, by {source}"
             f"{f', and {looks}' if np.isfinite(ratio) else ''}; keep one of them, or correct its time."
