@@ -4,7 +4,7 @@ The same light falls on the sensor in every exposure, so the pixel value that u 
 in the next, T(u), obeys g(T(u)) - g(u) = ln of the ratio of their times, with one response g for all
 pairs. T follows from the two histograms alone (Grossberg and Nayar, What can be known about the
 radiometric response from images, ECCV 2002), so the photographs need not be aligned. A smooth g is fitted
-to all pairs by least absolute deviations: a pair whose times are wrong stands out, and does not bend it.
+by least absolute deviations, so a photograph whose time is wrong stands out and does not bend it.
 """
 
 import itertools
@@ -48,22 +48,34 @@ def measure(histograms, times) -> Evidence:
     histograms : (P, 256) counts of pixel values, shortest exposure first; times : (P,) seconds, ascending
     """
     claimed = np.diff(np.log(times))
-    pairs = [_transfer(a, b) for a, b in itertools.pairwise(histograms)]
+    pairs = [transfer(a, b) for a, b in itertools.pairwise(histograms)]
     steps = [_basis(there) - _basis(here) for here, there in pairs]
     known = [j for j, step in enumerate(steps) if len(step)]
     seen = np.full(len(claimed), np.nan)
     if not known:
         return Evidence(claimed, seen)
 
-    ridge = PRIOR * np.eye(len(TYPICAL))
-    weights = np.ones(len(claimed))
-    for _ in range(20):  # least absolute deviations by reweighted least squares
-        scale = [np.sqrt(weights[j] / len(steps[j])) for j in known]
-        A = np.concatenate([*(s * steps[j] for s, j in zip(scale, known, strict=True)), ridge])
-        b = [np.full(len(steps[j]), s * claimed[j]) for s, j in zip(scale, known, strict=True)]
-        response = np.linalg.lstsq(A, np.concatenate([*b, ridge @ TYPICAL]), rcond=None)[0]
-        seen[known] = [np.median(steps[j] @ response) for j in known]
-        weights[known] = 1 / np.maximum(np.abs(seen - claimed)[known], 0.05)
+    # Unknown: the response, and one constant for every chain of photographs without a gap.
+    size = len(TYPICAL)
+    mean = np.array([step.mean(axis=0) if len(step) else np.zeros(size) for step in steps])
+    chain = np.concatenate([[0], np.cumsum([len(step) == 0 for step in steps])])
+    from_start = np.concatenate([np.zeros((1, size)), np.cumsum(mean, axis=0)])
+    n_chains = chain[-1] + 1
+    # By least absolute deviations: the log time of every photograph, which a swap of two can't bend, and the
+    # step of every pair, which a wrong first or last can't bend.
+    robust = np.vstack([np.hstack([from_start, np.eye(n_chains)[chain]]), np.pad(mean[known], ((0, 0), (0, n_chains)))])
+    claims = np.concatenate([np.log(times), claimed[known]])
+    # By least squares: all values of a pair agree on its step, and the response is not far from typical.
+    flat = [(steps[j] - mean[j]) / np.sqrt(len(steps[j])) for j in known]
+    smooth = np.pad(np.concatenate([*flat, PRIOR * np.eye(size)]), ((0, 0), (0, n_chains)))
+    wanted = np.concatenate([np.zeros(len(smooth) - size), PRIOR * TYPICAL])
+    weights = np.ones(len(claims))
+    for least in np.geomspace(2, 0.05, 40):  # reweighted least squares, ever less smooth
+        root = np.sqrt(weights)
+        A, b = np.concatenate([root[:, None] * robust, smooth]), np.concatenate([root * claims, wanted])
+        x = np.linalg.lstsq(A, b, rcond=None)[0]
+        weights = 1 / np.maximum(np.abs(robust @ x - claims), least)
+    seen[known] = [np.median(steps[j] @ x[:size]) for j in known]
     return Evidence(claimed, seen)
 
 
@@ -72,11 +84,11 @@ def looks_brighter(first, second) -> float:
 
     first, second : (256,) counts of pixel values
     """
-    here, there = _transfer(first, second)
+    here, there = transfer(first, second)
     return float(np.exp(np.median((_basis(there) - _basis(here)) @ TYPICAL))) if len(here) else float("nan")
 
 
-def _transfer(first, second) -> tuple[np.ndarray, np.ndarray]:
+def transfer(first, second) -> tuple[np.ndarray, np.ndarray]:
     """Pixel values of one photograph and, by matching histograms, what they became in the next."""
     below_first, below_second = (np.cumsum(h) - h / 2 for h in (first, second))
     here = np.arange(256.0)
@@ -108,9 +120,9 @@ def doubts(evidence: Evidence, times, names, source: str) -> list[str]:
     cuts = np.flatnonzero(np.isnan(evidence.seen)) + 1
     for chain in np.split(np.arange(len(times)), cuts):
         off = np.concatenate([[0.0], np.cumsum(excess[chain[:-1]])])
-        usual = max(off, key=lambda o: np.sum(np.abs(off - o) <= LIMIT))
-        wrong = np.abs(off - usual) > LIMIT
-        if 3 * wrong.sum() < len(chain):
+        usual = max(off, key=lambda o: np.sum(np.abs(off - o) <= LIMIT / 2))
+        wrong = np.abs(off - usual) > LIMIT / 2
+        if 0 < 3 * wrong.sum() < len(chain):
             for i in chain[wrong]:
                 fits = times[i] * 2.0 ** (off - usual)[i - chain[0]]
                 sentences.append(

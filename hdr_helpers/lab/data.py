@@ -1,6 +1,8 @@
 """The brackets that the course brings along, and their truth."""
 
 import io
+import shutil
+import tempfile
 import zipfile
 from dataclasses import replace
 from functools import cache
@@ -37,6 +39,23 @@ def with_truth(bracket: Bracket, folder) -> Bracket:
     if truth.radiance.shape != bracket.images[0].shape:
         raise BracketError(f"{path} is not the truth of these photographs: its size differs. Remove it.")
     return replace(bracket, truth=truth)
+
+
+def what_loading_says(bracket_folder, times: dict) -> list[str]:
+    """What load_bracket has to say of a folder's photographs if a list gave them other times.
+
+    times : from file name to what the list holds
+    Copies are loaded and thrown away; the folder stays as it is.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        for name in times:
+            shutil.copy(Path(bracket_folder) / name, folder)
+        lines = [f"{name} {time}" for name, time in times.items()]
+        (Path(folder) / "times.txt").write_text("\n".join(lines), encoding="utf-8")
+        try:
+            return list(load_bracket(folder).notes)
+        except BracketError as problem:
+            return [f"BracketError: {problem}"]
 
 
 def save_truth(folder, truth: Truth, scale: float) -> None:

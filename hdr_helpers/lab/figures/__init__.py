@@ -13,11 +13,15 @@ from hdr_helpers.lab.figures.crf import (
     sampling_figure,
 )
 from hdr_helpers.lab.figures.load import (
+    TOO_BRIGHT,
+    TOO_DARK,
     clipping_overlay,
+    clipping_strip_figure,
     histogram_figure,
     one_photo_figure,
     pixel_figure,
     strip_figure,
+    transfer_figure,
 )
 from hdr_helpers.lab.figures.merge import (
     error_figure,
@@ -30,8 +34,11 @@ from hdr_helpers.lab.figures.style import jpeg_bytes, pictures_figure, png_bytes
 from hdr_helpers.lab.figures.tonemap import curve_figure, eight_bits_figure
 
 __all__ = [
+    "TOO_BRIGHT",
+    "TOO_DARK",
     "bitmaps_figure",
     "clipping_overlay",
+    "clipping_strip_figure",
     "crf_error_figure",
     "crf_figure",
     "curve_figure",
@@ -56,5 +63,6 @@ __all__ = [
     "shifts_figure",
     "show",
     "strip_figure",
+    "transfer_figure",
     "viewed_at",
 ]

@@ -4,13 +4,16 @@ import cv2
 import numpy as np
 from matplotlib import patheffects
 
+from hdr_helpers._reading.evidence import transfer
 from hdr_helpers.crf import CLIPPED, NOISE
 from hdr_helpers.lab.figures.style import (
+    ACCENT,
     BRIGHT_MARK,
     CHANNELS,
     DARK_MARK,
     INK,
     THREE,
+    WIDTH,
     bare,
     headline,
     new_figure,
@@ -20,12 +23,15 @@ from hdr_helpers.lab.figures.style import (
 )
 from hdr_helpers.lab.metrics import radiance_error
 
+TILE = 320  # pixels across of a photograph on a contact sheet
 TOO_DARK, TOO_BRIGHT = NOISE + 1, CLIPPED  # pixel values below and from which a JPEG says nothing to rely on
 
 
 def strip_figure(bracket, title=None, cols=5):
     """All photographs of a bracket as a contact sheet."""
-    small = [cv2.resize(i, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for i in bracket.in_8_bits().images]
+    scale = min(1, TILE / bracket.images[0].shape[1])
+    images = bracket.in_8_bits().images
+    small = [cv2.resize(i, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for i in images]
     return pictures_figure(small, [seconds(t) for t in bracket.times], cols, title)
 
 
@@ -45,17 +51,70 @@ def histogram_figure(image, time):
     bare(left)
     left.imshow(clipping_overlay(image))
     left.set_title("striped: too dark (blue) or too bright (orange)", fontsize=10)
-    for c, (name, colour, style, _) in enumerate(CHANNELS):
-        count = np.bincount(image[..., c].ravel(), minlength=256)
-        right.plot(count / count.sum() * 100, color=colour, ls=style, label=name)
-    right.axvspan(0, TOO_DARK, color=DARK_MARK, alpha=0.25)
-    right.axvspan(TOO_BRIGHT, 255, color=BRIGHT_MARK, alpha=0.35)
-    right.set(xlabel="pixel value", ylabel="share of pixels (%)", ylim=(0.01, 100), yscale="log", xlim=(0, 255))
+    _draw_histogram(right, image)
+    right.set(xlabel="pixel value", ylabel="share of pixels (%)")
     right.legend(frameon=False, loc="upper center")
     usable = ((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2).mean()
     right.set_title(f"{usable:.0%} of the pixels usable", fontsize=10)
-    plain(right)
     headline(fig, f"exposure time {seconds(time)}")
+    return fig
+
+
+def clipping_strip_figure(bracket, which):
+    """Photographs of a bracket in a row, their unusable pixels striped, above their histograms.
+
+    which : indices of the photographs
+    """
+    bracket = bracket.in_8_bits()
+    height, width = (TILE * np.array(bracket.images[0].shape[:2]) / bracket.images[0].shape[1]).astype(int).tolist()
+    fig, axes = new_figure(2, len(which), WIDTH / len(which) * height / width + 2.5, height_ratios=[1, 1.2])
+    for i, (above, below) in zip(which, axes.T, strict=True):
+        image = bracket.images[i]
+        bare(above)
+        # Shrunk without averaging, so that what is clipped stays clipped; then striped, so that stripes are seen.
+        above.imshow(clipping_overlay(cv2.resize(image, (width, height), interpolation=cv2.INTER_NEAREST)))
+        above.set_title(seconds(bracket.times[i]), fontsize=10)
+        _draw_histogram(below, image)
+        below.set(xticks=(0, 128, 255), xlabel="pixel value", ylabel="share of pixels (%)")
+        below.label_outer()
+    axes[1, 0].legend(frameon=False, fontsize=9)
+    headline(fig, "As the time grows, the histogram moves from the dark end to the bright one")
+    return fig
+
+
+def _draw_histogram(ax, image):
+    """Share of pixels at each value, on a logarithmic scale, with the unusable values shaded."""
+    for c, (name, colour, style, _) in enumerate(CHANNELS):
+        count = np.bincount(image[..., c].ravel(), minlength=256)
+        ax.plot(count / count.sum() * 100, color=colour, ls=style, label=name)
+    ax.axvspan(0, TOO_DARK, color=DARK_MARK, alpha=0.25)
+    ax.axvspan(TOO_BRIGHT, 255, color=BRIGHT_MARK, alpha=0.35)
+    ax.set(ylim=(0.01, 100), yscale="log", xlim=(0, 255))
+    plain(ax)
+
+
+def transfer_figure(bracket, j):
+    """What the pixel values of photograph j became in the next one, and in those after it."""
+    images, times = [image[..., 1] for image in bracket.in_8_bits().images], bracket.times
+    histograms = [np.bincount(image.ravel(), minlength=256) for image in images]
+    joint = np.histogram2d(images[j + 1].ravel(), images[j].ravel(), bins=256, range=((0, 256), (0, 256)))[0]
+    fig, (left, right) = new_figure(1, 2, 4.6)
+    left.imshow(np.log1p(joint), origin="lower", cmap="Greys", extent=(0, 256, 0, 256))
+    left.set_title("every pixel of the picture, and the curve of the histograms", fontsize=10)
+    left.set_ylabel(f"pixel value at {seconds(times[j + 1])}")
+    for ax, steps in ((left, (1,)), (right, (1, 2, 3))):
+        for k, (colour, style, _) in zip(steps, THREE, strict=False):
+            here, there = transfer(histograms[j], histograms[j + k])
+            stops = np.log2(times[j + k] / times[j])
+            ax.plot(
+                here, there, color=colour, ls=style, lw=2.5, label=f"{seconds(times[j + k])}: {stops:.1f} stops longer"
+            )
+        ax.plot((0, 256), (0, 256), color=ACCENT, ls="-.", label="equal exposures")
+        ax.set(xlabel=f"pixel value at {seconds(times[j])} (green)", xlim=(0, 256), ylim=(0, 256), aspect="equal")
+        ax.legend(frameon=False, loc="lower right", fontsize=9)
+    right.set(ylabel="pixel value in the other photograph")
+    right.set_title("the longer the exposure, the further from equal", fontsize=10)
+    headline(fig, "What a pixel value becomes in another exposure depends on the value alone")
     return fig
 
 

@@ -44,7 +44,7 @@ def plain(ax) -> None:
 
 def seconds(t: float) -> str:
     """An exposure time as cameras write it: 1/60 s, 0.6 s, 4 s."""
-    return f"1/{round(1 / t)} s" if t < 0.4 else f"{t:g} s"
+    return f"1/{round(1 / t)} s" if t < 0.4 else f"{t:.3g} s"
 
 
 def png_bytes(fig) -> bytes:
