@@ -4,6 +4,9 @@ A border has one colour and touches the edge of the frame. So does a dark corner
 a border away is that light can't explain it: a longer exposure is never darker, a shorter one never brighter.
 """
 
+from collections import Counter
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 
@@ -13,6 +16,7 @@ MIN_SHARE = 0.002  # of the frame's pixels; less is not worth a mask
 MAX_SHARE = 0.5  # what covers more is no border
 ENOUGH = 10_000  # pixels of a border that are looked at
 COLOURFUL = 64  # between the channels of a colour that no grey, black or white comes near
+SUSPICION = 0.1  # of the edge's pixels of one colour that light must fail to explain, to look any further
 MAJORITY = 0.5  # of a border's pixels that light must fail to explain
 
 
@@ -21,48 +25,53 @@ def find_borders(images) -> list[np.ndarray | None]:
 
     images : P arrays (H, W, 3) uint8, shortest exposure first, roughly on each other
     """
-    found = [_flat_regions(image) for image in images]
-    colours = [colour for regions in found for colour, _ in regions]
-    flat = [image.reshape(-1, 3) for image in images]
+    edges = [np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]) for image in images]
+    colours = [_common_colours(edge) for edge in edges]
+    count = Counter(colour for some in colours for colour in some)
+    pixels = [image.reshape(-1, 3) for image in images]
     valid = []
-    for j, (image, regions) in enumerate(zip(images, found, strict=True)):
+    for j, image in enumerate(images):
         inside = np.ones(image.shape[:2], dtype=bool)
-        for colour, region in regions:
+        for colour in colours[j]:
             # Black and white may be night and sun; one strong colour at the edge of most exposures is neither.
-            repeated = np.ptp(colour) > COLOURFUL and colours.count(colour) > len(images) / 2
-            if repeated or _impossible(flat, j, region) > MAJORITY:
-                inside[region] = False
+            repeated = np.ptp(colour) > COLOURFUL and count[colour] > len(images) / 2
+            there = np.flatnonzero(np.abs(edges[j].astype(np.int16) - colour).max(axis=1) <= TOLERANCE)
+            if not repeated and _impossible(edges, j, there) < SUSPICION:
+                continue
+            for region in _regions_at_edge(image, colour):
+                points = np.flatnonzero(region)
+                if repeated or _impossible(pixels, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
+                    inside[region] = False
         valid.append(None if inside.all() else inside)
     return valid
 
 
-def _impossible(flat, j: int, region) -> float:
-    """Share of a region's pixels in photograph j that are darker than in a shorter exposure, or brighter than in a
-    longer one. flat : P arrays (H * W, 3) uint8"""
-    points = np.flatnonzero(region)
-    points = points[:: max(1, len(points) // ENOUGH)]
-    here = flat[j][points].astype(np.int16)
+def _impossible(pixels, j: int, points) -> float:
+    """Share of points in photograph j that are darker than in a shorter exposure, or brighter than in a longer one.
+
+    pixels : P arrays (n, 3) uint8, shortest exposure first; points : indices into n
+    """
+    here = pixels[j][points].astype(np.int16)
     against = np.zeros(len(points), dtype=bool)
-    for k, other in enumerate(flat):
-        excess = (other[points] - here) * np.sign(j - k)
-        against |= (excess > CONTRADICTION).any(axis=1)
+    for k, other in enumerate(pixels):
+        against |= ((other[points] - here) * np.sign(j - k) > CONTRADICTION).any(axis=1)
     return float(against.mean())
 
 
-def _flat_regions(image) -> list[tuple[tuple[int, ...], np.ndarray]]:
-    """Colours and regions, (H, W) bool, of one colour that touch the edge of the frame."""
-    edge = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+def _common_colours(edge) -> list[tuple[int, int, int]]:
+    """Up to three colours that make up the edge of a frame, (n, 3) uint8; none with less than a fiftieth of it."""
     packed = edge.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
     shades, count = np.unique(packed, return_counts=True)
-    common = shades[np.argsort(-count, kind="stable")][:3]
-    regions = []
-    for shade in common[np.sort(count)[::-1][:3] > len(edge) / 50]:
-        colour = (int(shade) >> 16, int(shade) >> 8 & 255, int(shade) & 255)
-        low, high = (np.clip(np.add(colour, d), 0, 255).astype(np.float64) for d in (-TOLERANCE, TOLERANCE))
-        flat = cv2.inRange(image, low, high)
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(flat, connectivity=4)
-        for label, (left, top, width, height, area) in enumerate(stats[1:], 1):
-            on_edge = left == 0 or top == 0 or left + width == image.shape[1] or top + height == image.shape[0]
-            if on_edge and MIN_SHARE < area / flat.size < MAX_SHARE:
-                regions.append((colour, labels == label))
-    return regions
+    most = np.argsort(-count, kind="stable")[:3]
+    return [(int(s) >> 16, int(s) >> 8 & 255, int(s) & 255) for s in shades[most[count[most] > len(edge) / 50]]]
+
+
+def _regions_at_edge(image, colour) -> Iterator[np.ndarray]:
+    """Connected regions, (H, W) bool, of one colour that touch the edge of the frame."""
+    low, high = (np.clip(np.add(colour, d), 0, 255).astype(np.float64) for d in (-TOLERANCE, TOLERANCE))
+    flat = cv2.inRange(image, low, high)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(flat, connectivity=4)
+    for label, (left, top, width, height, area) in enumerate(stats[1:], 1):
+        at_edge = left == 0 or top == 0 or left + width == image.shape[1] or top + height == image.shape[0]
+        if at_edge and MIN_SHARE < area / flat.size < MAX_SHARE:
+            yield labels == label
