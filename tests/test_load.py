@@ -294,7 +294,7 @@ def test_a_list_with_a_time_that_is_no_number_is_refused_by_name(save):
 
 
 def test_equal_times_are_refused_with_both_names(save):
-    refused(save(NAMES, {"t.txt": "1/400 1/60 1/60 0.6"}), "a_2.png", "a_3.png", "0.01667 s", "a_3.png looks brighter")
+    refused(save(NAMES, {"t.txt": "1/400 1/60 1/60 0.6"}), "a_2.png", "a_3.png", "0.01667 s", "not equally bright")
 
 
 def test_times_that_do_not_fit_the_brightness_are_refused(save):

@@ -172,7 +172,7 @@ def _number(word: str) -> float | None:
         value = float(parts[1]) / float(parts[2] or 1) * UNITS[(parts[3] or "").lower()]
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
         return None
-    return value if np.isfinite(value) else None
+    return value if value == 0 or 1e-9 < abs(value) < 1e9 else None  # beyond that nothing is a time, nan neither
 
 
 # ------------------------------------------------------------------------------------- file names

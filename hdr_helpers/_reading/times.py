@@ -114,54 +114,60 @@ class _Camera:
             "relative to the least sensitive photograph, and stands for the exposure."
         )
 
+    def is_exposure(self, values) -> bool:
+        """Whether values are t ISO / N^2 of the photographs already, and not shutter times."""
+        if not self.listed:
+            return False
+        shutter = np.array(self.listed.values)
+        return _same(values, shutter * self.gains) and not _same(values, shutter)
+
 
 def _judge(source, listed, camera, names, histograms) -> _Candidate:
     """Turn what is written into seconds of exposure, and ask the photographs what they think of it.
 
     Raises BracketError where it can't be true.
     """
-    values, notes = np.array(listed.values, dtype=np.float64), []
-    gains = camera.gains
-    if gains is not None and camera.listed and listed is not camera.listed:
-        shutter = np.array(camera.listed.values)
-        if not _same(values, shutter) and not _same(1 / values, shutter) and _same(values, shutter * gains):
-            gains = None  # the list holds exposures already
-    if gains is None:
-        gains = np.ones(len(values))
-    else:
-        notes.append(camera.note)
-
     brightness = histograms @ np.arange(256) / histograms.sum(axis=1)
-    if listed.kind == EV or (listed.kind == OPEN and values.min() <= 0 and _may_be_stops(values, brightness)):
-        values = np.exp2(values)
-        notes.append(f"{_capital(source)} holds EV steps; times are relative, 2 to the EV.")
-    elif values.min() <= 0:
-        i = int(np.argmin(values))
+    values, notes = _exposures(source, listed, camera, names, brightness)
+    order = np.argsort(values, kind="stable")
+    named, histograms = [names[i] for i in order], histograms[order]
+    for i in np.flatnonzero(np.diff(values[order]) == 0):
+        ratio = looks_brighter(histograms[i], histograms[i + 1])
+        looks = "they look alike" if 0.9 < ratio < 1.1 else "they are not equally bright"
         raise BracketError(
-            f"{_capital(source)} gives {values[i]:g} s for {names[i]}; a time is positive, as in: {names[i]} 1/60"
+            f"{named[i]} and {named[i + 1]} have the same exposure time, {values[order[i]]:.4g} s, by {source}"
+            f"{f', and {looks}' if np.isfinite(ratio) else ''}; keep one of them, or correct its time."
         )
-    elif listed.kind == OPEN and _agreement(values * gains, brightness) <= -MIN_AGREEMENT:
-        values = 1 / values
-        notes.append(f"{_capital(source)} reads as 1/seconds: the photographs get darker as its numbers grow.")
-    values = values * gains
     if _agreement(values, brightness) < MIN_AGREEMENT:
         raise BracketError(
             f"By {source} the photographs do not get brighter as the exposure gets longer; check which time "
             "belongs to which photograph, and that ISO and aperture were fixed."
         )
-
-    order = np.argsort(values, kind="stable")
-    named, histograms = [names[i] for i in order], histograms[order]
-    for i in np.flatnonzero(np.diff(values[order]) == 0):
-        ratio = looks_brighter(histograms[i], histograms[i + 1])
-        looks = "they look alike" if 0.9 < ratio < 1.1 else f"{named[i + 1]} looks brighter than the other"
-        raise BracketError(
-            f"{named[i]} and {named[i + 1]} have the same exposure time, {values[order[i]]:.4g} s, by {source}"
-            f"{f', and {looks}' if np.isfinite(ratio) else ''}; keep one of them, or correct its time."
-        )
-    evidence = measure(histograms, values[order])
     times = Times(values, listed.places, source, notes)
-    return _Candidate(times, doubts(evidence, values[order], named, source))
+    return _Candidate(times, doubts(measure(histograms, values[order]), values[order], named, source))
+
+
+def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, list[str]]:
+    """Seconds, with ISO and aperture in them where those change, from what is written; and notes on what it was."""
+    values, notes = np.array(listed.values, dtype=np.float64), []
+    as_stops = listed.kind == EV or (listed.kind == OPEN and _may_be_stops(values, brightness))
+    if not as_stops and values.min() <= 0:
+        i = int(np.argmin(values))
+        raise BracketError(
+            f"{_capital(source)} gives {values[i]:g} s for {names[i]}; a time is positive, as in: {names[i]} 1/60"
+        )
+    if as_stops:
+        values = np.exp2(np.clip(values, -EV_REACH, EV_REACH))
+        notes.append(f"{_capital(source)} holds EV steps; times are relative, 2 to the EV.")
+
+    gains = np.ones(len(values))
+    if camera.gains is not None and not camera.is_exposure(values):
+        gains = camera.gains
+        notes.append(camera.note)
+    if listed.kind == OPEN and not as_stops and _agreement(values * gains, brightness) <= -MIN_AGREEMENT:
+        values = 1 / values
+        notes.append(f"{_capital(source)} reads as 1/seconds: the photographs get darker as its numbers grow.")
+    return values * gains, notes
 
 
 def _capital(sentence: str) -> str:
@@ -175,17 +181,15 @@ def _agreement(values, brightness) -> float:
 
 
 def _may_be_stops(values, brightness) -> bool:
-    """Whether numbers that aren't all positive are EV steps, and not times with a slip of the pen."""
+    """Whether numbers, some of them not positive, are EV steps and not times with a slip of the pen."""
     steps = np.diff(np.sort(values))
-    return (
-        steps.min() >= EV_STEP and np.abs(values).max() <= EV_REACH and _agreement(values, brightness) >= MIN_AGREEMENT
-    )
+    plausible = values.min() <= 0 and np.abs(values).max() <= EV_REACH and steps.min() >= EV_STEP
+    return plausible and _agreement(values, brightness) >= MIN_AGREEMENT
 
 
 def _same(a, b) -> bool:
     """Whether two lists of positive numbers agree but for one factor and for rounding."""
-    ratio = np.log(np.abs(a)) - np.log(b)
-    return bool(np.ptp(ratio) < 2 * ROUNDING)
+    return bool(np.ptp(np.log(a) - np.log(b)) < 2 * ROUNDING)
 
 
 def _differences(names, chosen: Times, other: Times) -> list[str]:
