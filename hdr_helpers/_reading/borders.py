@@ -20,15 +20,16 @@ SUSPICION = 0.1  # of the edge's pixels of one colour that light must fail to ex
 MAJORITY = 0.5  # of a border's pixels that light must fail to explain
 
 
-def find_borders(images) -> list[np.ndarray | None]:
+def find_borders(images, opaque) -> list[np.ndarray | None]:
     """For each photograph where it is a photograph, (H, W) bool, or None where it is one everywhere.
 
     images : P arrays (H, W, 3) uint8, shortest exposure first, roughly on each other
+    opaque : P arrays (H, W) bool, or None, outside of which a photograph is no evidence against another
     """
-    edges = [np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]) for image in images]
+    edges, pixels = [_edge(image) for image in images], [image.reshape(-1, 3) for image in images]
+    edge_counts, counts = ([m if m is None else of(m) for m in opaque] for of in (_edge, np.ravel))
     colours = [_common_colours(edge) for edge in edges]
     count = Counter(colour for some in colours for colour in some)
-    pixels = [image.reshape(-1, 3) for image in images]
     valid = []
     for j, image in enumerate(images):
         inside = np.ones(image.shape[:2], dtype=bool)
@@ -36,26 +37,33 @@ def find_borders(images) -> list[np.ndarray | None]:
             # Black and white may be night and sun; one strong colour at the edge of most exposures is neither.
             repeated = np.ptp(colour) > COLOURFUL and count[colour] > len(images) / 2
             there = np.flatnonzero(np.abs(edges[j].astype(np.int16) - colour).max(axis=1) <= TOLERANCE)
-            if not repeated and _impossible(edges, j, there) < SUSPICION:
+            if not repeated and _impossible(edges, edge_counts, j, there) < SUSPICION:
                 continue
             for region in _regions_at_edge(image, colour):
                 points = np.flatnonzero(region)
-                if repeated or _impossible(pixels, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
+                if repeated or _impossible(pixels, counts, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
                     inside[region] = False
         valid.append(None if inside.all() else inside)
     return valid
 
 
-def _impossible(pixels, j: int, points) -> float:
+def _impossible(pixels, counts, j: int, points) -> float:
     """Share of points in photograph j that are darker than in a shorter exposure, or brighter than in a longer one.
 
     pixels : P arrays (n, 3) uint8, shortest exposure first; points : indices into n
+    counts : P arrays (n,) bool, which pixels are evidence, or None for all
     """
     here = pixels[j][points].astype(np.int16)
     against = np.zeros(len(points), dtype=bool)
-    for k, other in enumerate(pixels):
-        against |= ((other[points] - here) * np.sign(j - k) > CONTRADICTION).any(axis=1)
+    for k, (other, solid) in enumerate(zip(pixels, counts, strict=True)):
+        excess = ((other[points] - here) * np.sign(j - k)).max(axis=1)
+        against |= (excess > CONTRADICTION) & (True if solid is None else solid[points])
     return float(against.mean())
+
+
+def _edge(image) -> np.ndarray:
+    """The outermost pixels of a picture (H, W) or (H, W, 3), one after the other."""
+    return np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
 
 
 def _common_colours(edge) -> list[tuple[int, int, int]]:

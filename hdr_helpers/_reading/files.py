@@ -1,6 +1,8 @@
 """The files of a bracket, from a folder or a zip. Nothing is ever unpacked to disk."""
 
 import io
+import lzma
+import os
 import re
 import zipfile
 import zlib
@@ -11,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from hdr_helpers._reading import IMAGE_SUFFIXES, BracketError
 
 MAX_BYTES = 4 * 2**30  # what a zip may hold, all files together, packed or unpacked
+DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, ValueError)  # in a zip
 MAX_DEPTH = 3  # folders inside folders: unpacking a zip often leaves one or two
 
 
@@ -20,12 +23,12 @@ def bracket_files(path: Path) -> dict[str, Callable[[], bytes]]:
     path : folder or zip; where it holds no photographs itself, the one folder inside that does is taken
     Raises BracketError where there is no such place, more than one, or a zip that can't be unpacked.
     """
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path.is_dir it has an answer for a name that is too long
         files = _folder_files(path)
-    elif path.is_file() and zipfile.is_zipfile(path):
+    elif os.path.isfile(path) and zipfile.is_zipfile(path):
         files = _zip_files(path)
     else:
-        state = "is neither a folder nor a zip" if path.exists() else "does not exist"
+        state = "is neither a folder nor a zip" if os.path.exists(path) else "does not exist"
         raise BracketError(f"{path} {state}; give the folder or zip that holds the photographs.")
     home = _home(files, path)
     return {f.name: read for f, read in files.items() if f.parent == home}
@@ -87,7 +90,10 @@ def _reader(path: Path) -> Callable[[], bytes]:
 def _zip_files(path: Path) -> dict[PurePosixPath, Callable[[], bytes]]:
     size = path.stat().st_size
     if size <= MAX_BYTES:
-        archive = zipfile.ZipFile(io.BytesIO(path.read_bytes()))
+        try:
+            archive = zipfile.ZipFile(io.BytesIO(path.read_bytes()))
+        except DAMAGE as problem:
+            raise BracketError(f"{path} is damaged ({problem}); fetch it again, or make the zip again.") from None
         members = {_member_path(m): m for m in archive.infolist() if not m.is_dir()}
         members = {name: m for name, m in members.items() if not _hidden(name)}
         size = sum(m.file_size for m in members.values())
@@ -116,8 +122,11 @@ def _member_path(member: zipfile.ZipInfo) -> PurePosixPath:
 
 def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path) -> bytes:
     try:
-        return archive.read(member)  # never more than the size it declares
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError) as problem:
+        if member.flag_bits & 1:
+            raise RuntimeError("it has a password")
+        with archive.open(member) as file:
+            return file.read(member.file_size)  # read() alone would unpack whatever is there
+    except DAMAGE as problem:
         raise BracketError(
             f"{member.filename} can't be unpacked from {path} ({problem}); make the zip again, without a password."
         ) from None

@@ -21,7 +21,9 @@ UNITS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "秒": 1.0, "ms": 
 UNIT = "(" + "|".join(sorted(filter(None, UNITS), key=len, reverse=True)) + ")"
 TIME_TITLE = re.compile(r"shutter|time|expos|speed|sec|^t$", re.IGNORECASE)
 OTHER_TITLE = re.compile(r"f.?stop|f.?num|^f$|apert|iso|gain|^nd", re.IGNORECASE)
-MAX_TEXT = 2**20  # bytes; a longer file is no list of exposure times
+FRACTION = re.compile(rf"(?:^|{SEPARATOR})[\d.]+/[\d.]+{UNIT}?(?=$|{SEPARATOR})")
+MAX_TEXT = 2**18  # bytes; a longer file is no list of exposure times
+MAX_NAME = 1000  # characters before a suffix in which the name of a photograph is looked for
 
 
 class Listed(NamedTuple):
@@ -50,16 +52,18 @@ def text_values(file: str, data: bytes, names: list[str]) -> Listed | None:
     named = [(place, label, numbers or []) for place, label, numbers in split if label]
     bare = [(place, numbers) for place, label, numbers in split if not label]
     # 1/60 can only be seconds; 0.5 and 60 may be anything.
-    kind = SECONDS if re.search(r"(?<![\d/])\d+/\d+(?![\d/])", " ".join(row for _, row in rows)) else OPEN
+    kind = SECONDS if any(FRACTION.search(row) for _, row in rows) else OPEN
     if any(numbers for _, _, numbers in named):
         values, places = _by_name(file, named, names, _titles(text))
         return Listed(values, places, kind)
     if named or not all(numbers for _, numbers in bare):  # words that are neither names nor numbers
         return None
     flat = [(place, value) for place, numbers in bare for value in numbers]
-    by_row = [[(place, value) for value in numbers] for place, numbers in bare]
     if len(flat) == len(names) + 1 and flat[0][1] == len(names):  # how many follow
         del flat[0]
+    by_row = [[(place, value) for value in numbers] for place, numbers in bare]
+    if len(by_row) == len(names):  # a table without names: it can't be said which column is meant
+        by_row = []
     chosen = next((row for row in (flat, *by_row) if len(row) == len(names)), None)
     if chosen is None:
         return None
@@ -105,7 +109,8 @@ def _time_column(file, columns, titles) -> int:
                     "instead, its exposure t ISO / N^2."
                 )
         changing = times or changing
-    return changing[0] if changing else 0
+    counters = [i for i in changing if set(np.diff(sorted(columns[i]))) == {1}]
+    return next((i for i in (*changing, 0) if i not in counters), (*changing, 0)[0])
 
 
 def _titles(text: str) -> list[str]:
@@ -140,23 +145,28 @@ def _json_rows(text: str) -> list[tuple[str, str]]:
     except (ValueError, RecursionError):
         return []
     if isinstance(content, dict):
-        return [("", f"{name} {value}") for name, value in content.items()]
-    if not isinstance(content, list):
-        return []
-    return [("", " ".join(map(str, row.values())) if isinstance(row, dict) else str(row)) for row in content]
+        return [("", f"{name} {_json_row(value)}") for name, value in content.items()]
+    return [("", _json_row(value)) for value in content] if isinstance(content, list) else []
+
+
+def _json_row(value) -> str:
+    return " ".join(map(str, value.values())) if isinstance(value, dict) else str(value)
 
 
 def _split_row(row: str, stems: set[str]) -> tuple[str | None, list[float] | None]:
     """The photograph that a row names, in lower case, and the row's numbers; None for each where there is none."""
     row = re.sub(rf"(?<=[\d.])\s+(?={UNIT}(?!\w))", "", row)  # 16.7 ms is one word
+    if ";" in row:  # a CSV of a country that writes 0,5
+        row = re.sub(r"(?<=\d),(?=\d)", ".", row)
     end = re.search(rf"({SUFFIX})(?=$|{SEPARATOR})", row, re.IGNORECASE)
     if end:
         # A name may hold blanks, and a time may stand before it: the longest ending that is a photograph's.
-        before = row[: end.end()]
+        cut = max(0, end.end() - MAX_NAME)
+        before = row[cut : end.end()]
         starts = [0, *(m.end() for m in re.finditer(rf"{SEPARATOR}+", before))]
         labels = [(PurePosixPath(before[start:].replace("\\", "/")).name.lower(), start) for start in starts]
         label, start = next((c for c in labels if PurePosixPath(c[0]).stem in stems), labels[-1])
-        rest = row[end.end() :] + " " + before[:start]
+        rest = row[end.end() :] + " " + row[: cut + start]
         return label, [v for v in map(_number, re.split(rf"{SEPARATOR}+", rest)) if v is not None]
     words = re.split(rf"{SEPARATOR}+", row.strip())
     if len(words) > 1 and words[0].lower() in stems and _number(words[0]) is None:  # a name without its suffix
@@ -167,7 +177,7 @@ def _split_row(row: str, stems: set[str]) -> tuple[str | None, list[float] | Non
 
 def _number(word: str) -> float | None:
     """15, 0.5, 1/60, 1/60s or 16.7ms as a float, in seconds where there is a unit; None for anything else."""
-    parts = re.fullmatch(rf"([^/]+?)(?:/([^/]+?))?{UNIT}?", word, re.IGNORECASE)
+    parts = re.fullmatch(rf"([^/]+?)(?:/([^/]+?))?{UNIT}?\.?", word, re.IGNORECASE | re.ASCII)
     try:
         value = float(parts[1]) / float(parts[2] or 1) * UNITS[(parts[3] or "").lower()]
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
@@ -182,23 +192,30 @@ def name_values(names: list[str]) -> Listed | None:
     """Times spelled in file names: shot_EV-1.33 in EV, exp_1_60 as 1/60, img_0.033 and img_15 in seconds."""
     stems = [PurePosixPath(n).stem for n in names]
     places = tuple(f"the name {n}" for n in names)
-    stops = [re.search(r"EV[ _]?([+-]?\d+(?:\.\d+)?)(?!\d)", s, re.IGNORECASE) for s in stems]
+    # EV-1.33, ev_2, MultExpEV-4.72; not rev1
+    ev = r"(?:(?<![A-Za-z])[Ee][Vv]|(?<=[a-z])EV)[ _]?([+-]?\d{1,3}(?:\.\d{1,9})?)(?!\d)"
+    stops = [re.search(ev, s) for s in stems]
     if all(stops):
         return Listed(tuple(float(m[1]) for m in stops), places, EV)
-    fractions = [re.search(r"(?:^|\D)(1)[_-](\d+)$|(\d+)[_-](1)$", s) for s in stems]
+    fractions = [re.search(r"(?:^|\D)(1)[_-](\d{1,9})$|(?<!\d)(\d{1,9})[_-](1)$", s) for s in stems]
     if all(fractions):
         pairs = [(int(m[1] or m[3]), int(m[2] or m[4])) for m in fractions]
+        tops, bottoms = (sorted(numbers) for numbers in zip(*pairs, strict=True))
         # set_1_1, set_1_2, set_1_3 count the frames, 20240105_1 is a date, and nothing is divided by 0.
-        bottoms = sorted(bottom for _, bottom in pairs)
-        counted = bottoms == list(range(bottoms[0], bottoms[0] + len(bottoms)))
-        if counted or bottoms[0] == 0 or max(top for top, _ in pairs) > 60:
+        if _consecutive(bottoms) or _consecutive(tops) or bottoms[0] == 0 or tops[-1] > 60:
             return None
         return Listed(tuple(top / bottom for top, bottom in pairs), places, SECONDS)
-    decimals = [re.search(r"(\d+(?:\.\d+)?)s?$", s) for s in stems]
+    # Not the end of 2024.04.05.
+    decimals = [re.search(r"(?<!\d)(?<!\d\.)(\d{1,9}(?:\.\d{1,30})?)s?$", s) for s in stems]
     # Frame counters are whole numbers too; only a decimal point somewhere says that these are times.
     if all(decimals) and any("." in m[1] for m in decimals):
         return Listed(tuple(float(m[1]) for m in decimals), places, OPEN)
     return None
+
+
+def _consecutive(numbers: list[int]) -> bool:
+    """Whether ascending numbers count on by one."""
+    return numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
 def whole_number_names(names: list[str]) -> Listed | None:
@@ -208,5 +225,6 @@ def whole_number_names(names: list[str]) -> Listed | None:
     if not all(re.fullmatch(r"[1-9]\d{0,4}", s) for s in stems):
         return None
     values = tuple(float(s) for s in stems)
-    counted = np.ptp(np.diff(sorted(values))) == 0  # 1, 2, 3 or 10, 20, 30
+    evenly = np.ptp(np.diff(sorted(values))) == 0  # 10, 20, 30
+    counted = evenly or np.ptp(values) < 4 * len(values)  # 3869, 3870, 3872
     return None if counted else Listed(values, tuple(f"the name {n}" for n in names), OPEN)

@@ -10,8 +10,16 @@ import numpy as np
 from hdr_helpers._reading import BracketError
 
 MAX_PIXELS = 200_000_000  # of one photograph; a small file can unpack to a huge picture
-UPRIGHT = (None, 0, 1)  # EXIF orientations that need no turning; some programs write 0
-TIFF_MARKS = (b"II*\0", b"MM\0*")
+TURNS = {  # by EXIF orientation, from a picture (H, W) as it is stored to the upright one; 1, and 0 and 9, are none
+    2: np.fliplr,
+    3: lambda stored: np.rot90(stored, 2),
+    4: np.flipud,
+    5: np.transpose,
+    6: lambda stored: np.rot90(stored, -1),
+    7: lambda stored: np.rot90(stored, 2).T,
+    8: np.rot90,
+}
+TIFF_MARKS, PNG_MARK, JPEG_MARK = (b"II*\0", b"MM\0*"), b"\x89PNG", b"\xff\xd8"
 
 
 class Exif(NamedTuple):
@@ -40,23 +48,23 @@ def decode(name: str, data: bytes) -> Photograph:
     name : for messages; data : the file's bytes. Grey, indexed and CMYK pictures become RGB.
     Raises BracketError where it can't be read, is cut short, or holds something other than 8 or 16 bits.
     """
-    shades = re.match(rb"P[56]\s+(?:#.*\s+)*\d+\s+\d+\s+(\d+)\s", data)
+    heading = re.sub(rb"#[^\n]*", b" ", data[:2000]) if data[:1] == b"P" else b""
+    shades = re.match(rb"P[2356]\s+\d+\s+\d+\s+(\d+)\s", heading)
     if shades and shades[1] not in (b"255", b"65535"):  # OpenCV would scale others wrongly
         raise BracketError(
             f"{name} has values up to {shades[1].decode()}; save it with 8 or 16 bits, up to 255 or 65535."
         )
+    if data[:4] == PNG_MARK and len(data) > 24:  # no other kind packs so much into so little
+        _check_size(name, *struct.unpack_from(">II", data, 16))
     image, kinds, metadata = _decode(data, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
-    if image is None:
+    if image is None or not _has_end(data):
         raise BracketError(
             f"{name} can't be read as a picture: it is cut short, damaged or of another kind; copy it again, "
             "or save it as JPEG, PNG, TIFF, BMP or PPM of 8 or 16 bits."
         )
     if image.dtype not in (np.uint8, np.uint16):
         raise BracketError(f"{name} holds {image.dtype} values; photographs of 8 or 16 bits can be used.")
-    if image[..., 0].size > MAX_PIXELS:
-        raise BracketError(
-            f"{name} has {image[..., 0].size / 1e6:.0f} million pixels; scale it below {MAX_PIXELS / 1e6:.0f} million."
-        )
+    _check_size(name, *image.shape[:2])
     block = dict(zip(map(int, kinds), metadata, strict=False)).get(cv2.IMAGE_METADATA_EXIF)
     exif = read_exif(bytes(block) if block is not None else data if data[:4] in TIFF_MARKS else b"")
     return Photograph(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), _opaque(data, exif), exif)
@@ -65,19 +73,38 @@ def decode(name: str, data: bytes) -> Photograph:
 def _decode(data: bytes, flags: int):
     try:
         return cv2.imdecodeWithMetadata(np.frombuffer(data, np.uint8), flags)
-    except cv2.error:
+    except cv2.error as problem:
+        if problem.code == cv2.Error.StsNoMem:
+            raise MemoryError from None
         return None, (), ()
+
+
+def _check_size(name: str, height: int, width: int) -> None:
+    if height * width > MAX_PIXELS:
+        raise BracketError(
+            f"{name} has {height * width / 1e6:.0f} million pixels; scale it below {MAX_PIXELS / 1e6:.0f} million."
+        )
+
+
+def _has_end(data: bytes) -> bool:
+    """Whether a JPEG has its end mark; an interrupted copy may hold zeros there, which decode to grey."""
+    at = 2
+    while data[:2] == JPEG_MARK and at + 4 <= len(data) and data[at] == 0xFF:
+        if data[at + 1] == 0xDA:  # here the picture begins; before it stood EXIF, perhaps with a whole thumbnail
+            return b"\xff\xd9" in data[at:]
+        at += 2 + struct.unpack_from(">H", data, at + 2)[0]
+    return True
 
 
 def _opaque(data: bytes, exif: Exif) -> np.ndarray | None:
     """Where a picture with an alpha channel isn't transparent: programs that align leave such borders."""
-    has_alpha = data[:4] in TIFF_MARKS or (data[:4] == b"\x89PNG" and data[25:26] in (b"\4", b"\6"))
-    if not has_alpha or exif.orientation not in UPRIGHT:
+    if data[:4] not in TIFF_MARKS and not (data[:4] == PNG_MARK and data[25:26] in (b"\4", b"\6")):
         return None
     raw = _decode(data, cv2.IMREAD_UNCHANGED)[0]  # only this flag keeps alpha, and it ignores orientation
     if raw is None or raw.ndim != 3 or raw.shape[2] != 4 or raw[..., 3].all() or not raw[..., 3].any():
         return None
-    return raw[..., 3] > 0
+    opaque = raw[..., 3] > 0
+    return TURNS[exif.orientation](opaque) if exif.orientation in TURNS else opaque
 
 
 def read_exif(block: bytes) -> Exif:

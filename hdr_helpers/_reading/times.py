@@ -61,7 +61,7 @@ def find_times(path, names, texts, exif: list[Exif], histograms) -> Times:
     chosen = candidates.pop(first)
     notes = [*chosen.times.notes, *chosen.doubts, *map(str, misfits)]
     for trusted in candidates[:first]:
-        notes.append(f"{_capital(trusted.times.source)} is set aside. {trusted.doubts[0]}")
+        notes.append(f"Set aside: {trusted.times.source}. {trusted.doubts[0]}")
     for other in candidates:
         notes += _differences(names, chosen.times, other.times)
     return chosen.times._replace(notes=notes)
@@ -84,7 +84,8 @@ def _sources(texts, names, camera) -> tuple[list[tuple[str, Listed]], list[Brack
 
 
 def _nothing(path, names, texts) -> BracketError:
-    looked = f" {', '.join(texts)} held no line for each of the {len(names)} photographs." if texts else ""
+    some = ", ".join([*texts][:3]) + (f" and {len(texts) - 3} more" if len(texts) > 3 else "")
+    looked = f" No line for each of the {len(names)} photographs stands in {some}." if texts else ""
     return BracketError(
         f"No exposure times were found for the photographs in {path}.{looked} Put them in a text file "
         f"there, one line for each photograph, as in: {names[0]} 1/60"
@@ -153,12 +154,15 @@ def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, l
     as_stops = listed.kind == EV or (listed.kind == OPEN and _may_be_stops(values, brightness))
     if not as_stops and values.min() <= 0:
         i = int(np.argmin(values))
-        raise BracketError(
-            f"{_capital(source)} gives {values[i]:g} s for {names[i]}; a time is positive, as in: {names[i]} 1/60"
-        )
+        raise BracketError(f"{names[i]}: {values[i]:g} s by {source}; a time must be positive, as in: {names[i]} 1/60")
     if as_stops:
-        values = np.exp2(np.clip(values, -EV_REACH, EV_REACH))
-        notes.append(f"{_capital(source)} holds EV steps; times are relative, 2 to the EV.")
+        i = int(np.argmax(np.abs(values)))
+        if abs(values[i]) > EV_REACH:
+            raise BracketError(
+                f"{names[i]}: EV {values[i]:g} by {source}; EV steps lie between -{EV_REACH} and {EV_REACH}."
+            )
+        values = np.exp2(values)
+        notes.append(f"The numbers of {source} are EV steps; times are relative, 2 to the EV.")
 
     gains = np.ones(len(values))
     if camera.gains is not None and not camera.is_exposure(values):
@@ -166,7 +170,7 @@ def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, l
         notes.append(camera.note)
     if listed.kind == OPEN and not as_stops and _agreement(values * gains, brightness) <= -MIN_AGREEMENT:
         values = 1 / values
-        notes.append(f"{_capital(source)} reads as 1/seconds: the photographs get darker as its numbers grow.")
+        notes.append(f"The numbers of {source} are 1/seconds: the photographs get darker as they grow.")
     return values * gains, notes
 
 
