@@ -36,12 +36,13 @@ def hat_weights(black: int = 0, clipped: int = LEVELS) -> np.ndarray:
     return w
 
 
-def fitted_weights(images) -> np.ndarray:
+def fitted_weights(images, valid=None) -> np.ndarray:
     """The hat over the pixel values that this camera can be trusted with: above black, below CLIPPED.
 
     images : P arrays (H, W, 3) uint8 or uint16, shortest exposure first
+    valid : P arrays (H, W) bool, the pixels that count, or None for all
     """
-    return hat_weights(max(black_level(images), NOISE), CLIPPED)
+    return hat_weights(max(black_level(images, valid), NOISE), CLIPPED)
 
 
 def checked_weights(w) -> np.ndarray:
@@ -52,10 +53,11 @@ def checked_weights(w) -> np.ndarray:
     return w
 
 
-def black_level(images) -> int:
+def black_level(images, valid=None) -> int:
     """The pixel value that stands for no light: 0 in most files, about 17 in some scans.
 
     images : P arrays (H, W, 3) uint8 or uint16 (in 8 bits), aligned, shortest exposure first
+    valid : P arrays (H, W) bool, the pixels that count, or None for all
     It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
     nothing of the scene, yet each of the short exposures would say it with conviction.
     """
@@ -63,6 +65,8 @@ def black_level(images) -> int:
         return 0
     shortest, longer = (in_8_bits(image[::2, ::2]) for image in images[:2])
     pairs = shortest.astype(np.intp) * LEVELS + longer
+    if valid is not None:
+        pairs = pairs[(valid[0] & valid[1])[::2, ::2]]
     joint = np.bincount(pairs.ravel(), minlength=LEVELS**2).reshape(LEVELS, LEVELS)
     count = joint.sum(axis=1)
     median = np.argmax(np.cumsum(joint, axis=1) >= count[:, None] / 2, axis=1)
@@ -71,15 +75,17 @@ def black_level(images) -> int:
     return int(np.flatnonzero(still).max(initial=0))
 
 
-def whole_white(image) -> np.ndarray:
+def whole_white(image, valid=None) -> np.ndarray:
     """A photograph, (H, W, 3) uint8 or uint16, in which what is almost white and touches white is white.
 
     A clipped area in a JPEG is not all 255: here and there it reads 245, which would pass for a measurement.
     In a long exposure such a pixel says of the sun that it is hundreds of times too dim: it must not vote.
+    valid : (H, W) bool, the pixels that can be touched, or None for all
     """
     white = np.iinfo(image.dtype).max
     level = white // (LEVELS - 1)
-    touches_white = cv2.dilate(image, np.ones((3, 3), np.uint8)) >= CLIPPED * level
+    light = image if valid is None else image * valid[..., None]
+    touches_white = cv2.dilate(light, np.ones((3, 3), np.uint8)) >= CLIPPED * level
     return np.where(touches_white & (image >= (CLIPPED - RINGING) * level), image.dtype.type(white), image)
 
 
@@ -194,11 +200,12 @@ def recover_crf(bracket: Bracket, lam: float = 20.0, n: int = 20_000, seed: int 
     n : how many pixels speak, at most
     Returns crf, (3, 256) float64 with crf[:, 128] = 0; nowhere falling.
     """
-    images = [whole_white(in_8_bits(image)) for image in bracket.images]
+    masks = bracket.valid or [None] * len(bracket)
+    images = [whole_white(in_8_bits(image), mask) for image, mask in zip(bracket.images, masks, strict=True)]
     valid = np.ones(images[0].shape[:2], bool) if bracket.valid is None else np.logical_and.reduce(bracket.valid)
     rows, cols = sample_pixels(images, min(n, np.count_nonzero(valid)), seed, valid)
     Z = np.stack([image[rows, cols] for image in images], axis=1)  # (N, P, 3)
-    w = fitted_weights(images)
+    w = fitted_weights(images, bracket.valid)
     curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
     # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).
     curves = np.maximum.accumulate(curves, axis=1)

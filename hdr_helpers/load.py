@@ -145,10 +145,7 @@ def _histogram(image) -> np.ndarray:
 
 def _valid(images, opaque) -> tuple[tuple[np.ndarray, ...] | None, list[str]]:
     """Bracket.valid from borders and transparency, and a note where there is something to say."""
-    masks = []
-    for border, solid in zip(find_borders(images, opaque), opaque, strict=True):
-        given = [mask for mask in (border, solid) if mask is not None]
-        masks.append(np.logical_and.reduce(given) if given else None)
+    masks = find_borders(images, opaque)
     marked = sum(mask is not None for mask in masks)
     if not marked:
         return None, []

@@ -45,7 +45,7 @@ def clipping(images, valid=None) -> Clipping:
     """
     inside = np.s_[:, :] if valid is None else np.logical_and.reduce(valid)
     pixels = [in_8_bits(image)[inside].reshape(-1, 3) for image in images]
-    usable = np.flatnonzero(fitted_weights(images))
+    usable = np.flatnonzero(fitted_weights(images, valid))
     dark = np.array([(values < usable[0]).any(axis=1) for values in pixels])
     bright = np.array([(values > usable[-1]).any(axis=1) for values in pixels])
     shares = dark.mean(axis=1), bright.mean(axis=1)
@@ -80,12 +80,15 @@ def merge_debevec(images, times, crf, w=None, valid=None) -> np.ndarray:
         raise ValueError(f"crf must be (3, {LEVELS}) and finite; got {crf.shape}.")
     if valid is not None and [np.shape(mask) for mask in valid] != [image.shape[:2] for image in images]:
         raise ValueError(f"valid must hold one mask of {images[0].shape[:2]} for each photograph.")
-    shortest_first = [images[i] for i in np.argsort(times)]
-    w = fitted_weights(shortest_first) if w is None else checked_weights(w)
+    order = np.argsort(times)
+    images, times = [images[i] for i in order], times[order]
+    valid = None if valid is None else [np.asarray(valid[i], dtype=bool) for i in order]
+    w = fitted_weights(images, valid) if w is None else checked_weights(w)
     # In the shortest exposure even a doubtful value is better than none: nothing sees more.
-    settled = [image if t == times.min() else whole_white(image) for image, t in zip(images, times, strict=True)]
+    masks = valid or [None] * len(images)
+    settled = [images[0], *map(whole_white, images[1:], masks[1:])]
     values = np.iinfo(images[0].dtype).max + 1
-    radiance = _merge_by_tables(settled, *_tables(times, crf, w, values), valid)
+    radiance = _merge_by_tables(settled, *_tables(times, crf, w, values), masks)
     if valid is not None and not (somewhere := np.logical_or.reduce(valid)).all():
         radiance[~somewhere] = radiance[somewhere].min(axis=0) if somewhere.any() else 1
     return radiance
@@ -106,7 +109,7 @@ def _tables(times, crf, w, values: int) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))
 
 
-def _merge_by_tables(images, weighted, weights, valid) -> np.ndarray:
+def _merge_by_tables(images, weighted, weights, masks) -> np.ndarray:
     """Look up and add, some rows at a time; equation 6 and the exponential at the end. NaN where none is valid."""
     radiance = np.empty(images[0].shape, dtype=np.float32)
     for top in range(0, len(radiance), TILE_ROWS):
@@ -114,7 +117,7 @@ def _merge_by_tables(images, weighted, weights, valid) -> np.ndarray:
         numerator = np.zeros_like(radiance[rows])
         denominator = np.zeros_like(radiance[rows])
         for j, image in enumerate(images):
-            mask = None if valid is None else valid[j][rows].view(np.uint8)
+            mask = None if masks[j] is None else masks[j][rows].view(np.uint8)
             cv2.accumulate(cv2.LUT(image[rows], weighted[j]), numerator, mask)
             cv2.accumulate(cv2.LUT(image[rows], weights[j]), denominator, mask)
         cv2.exp(cv2.divide(numerator, denominator), radiance[rows])

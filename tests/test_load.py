@@ -94,13 +94,6 @@ def test_a_note_about_one_photograph_does_no_harm_to_the_list(save):
     np.testing.assert_allclose(bracket.times, TIMES)
 
 
-@pytest.mark.parametrize(
-    "names", [[f"set_1_{i}.png" for i in (1, 2, 3, 4)], [f"2024010{i}_1.png" for i in (5, 6, 7, 8)]]
-)
-def test_counters_and_dates_in_file_names_are_no_times(save, names):
-    refused(save(names), "No exposure times were found")
-
-
 def test_a_list_without_names_follows_the_natural_order_of_names(save, small_bracket):
     bracket = load_bracket(save(("shot_1.png", "shot_2.png", "shot_10.png"), {"t.txt": "1/400 1/60 1/10"}))
     assert bracket.names == ("shot_1.png", "shot_2.png", "shot_10.png")
@@ -204,13 +197,6 @@ def test_colours_come_as_red_green_blue(tmp_path):
     assert load_bracket(tmp_path).images[1][3, 3].tolist() == [180, 80, 20]
 
 
-def test_a_camera_held_upright_gives_upright_photographs(tmp_path, small_bracket):
-    for i, denominator in enumerate((400, 60)):
-        exif = exif_block(1, denominator, ">", orientation=6)  # turn by 90 degrees clockwise to show
-        write_with_exif(tmp_path / f"{i}.png", small_bracket.images[i], exif)
-    assert np.array_equal(load_bracket(tmp_path).images[0], np.rot90(small_bracket.images[0], -1))
-
-
 def test_16_bit_photographs_keep_all_16_bits_and_give_the_upper_8_on_request(save, small_bracket):
     folder = save(NAMES, {"t.txt": LISTED})
     for name, image in zip(NAMES, small_bracket.images, strict=False):
@@ -229,68 +215,6 @@ def refused(path, *words):
         load_bracket(path)
     for word in words:
         assert word in str(problem.value)
-
-
-def test_a_missing_folder_is_refused(tmp_path):
-    refused(tmp_path / "nowhere", "nowhere", "does not exist")
-
-
-def test_a_file_that_is_no_zip_is_refused(tmp_path):
-    (tmp_path / "notes.zip").write_text("not a zip")
-    refused(tmp_path / "notes.zip", "notes.zip", "neither a folder nor a zip")
-
-
-def test_an_empty_folder_is_refused(tmp_path):
-    refused(tmp_path, tmp_path.name, "0 photographs")
-
-
-def test_an_empty_zip_is_refused(tmp_path):
-    zipfile.ZipFile(tmp_path / "empty.zip", "w").close()
-    refused(tmp_path / "empty.zip", "empty.zip", "0 photographs")
-
-
-def test_a_zip_that_unpacks_to_too_much_is_refused(save, tmp_path, monkeypatch):
-    monkeypatch.setattr("hdr_helpers._reading.files.MAX_BYTES", 100_000)
-    refused(zipped(save(NAMES), tmp_path / "bomb.zip"), "bomb.zip", "unpacks to")
-
-
-def test_a_damaged_zip_is_refused(save, tmp_path):
-    target = zipped(save(NAMES, {"t.txt": LISTED}), tmp_path / "damaged.zip")
-    data = bytearray(target.read_bytes())
-    data[2000] ^= 255
-    target.write_bytes(data)
-    refused(target, "damaged.zip")
-
-
-def test_a_single_photograph_is_refused(save):
-    refused(save(NAMES[:1], {"t.txt": "1"}), "1 photograph;", "at least two")
-
-
-@pytest.mark.parametrize("data", [b"", b"not a picture", b"\xff\xd8\xff\xe0 cut short"])
-def test_a_file_that_is_no_picture_is_refused_by_name(save, data):
-    folder = save(NAMES, {"t.txt": LISTED})
-    (folder / "a_3.png").write_bytes(data)
-    refused(folder, "a_3.png")
-
-
-def test_half_a_photograph_is_refused_by_name(save):
-    folder = save(NAMES, {"t.txt": LISTED})
-    (folder / "a_3.png").write_bytes((folder / "a_3.png").read_bytes()[:9000])
-    refused(folder, "a_3.png")
-
-
-def test_different_sizes_are_refused_with_both(save, small_bracket):
-    folder = save(NAMES, {"t.txt": LISTED})
-    cv2.imwrite(str(folder / "a_2.png"), small_bracket.images[1][:-1, :-2])
-    refused(folder, "a_2.png", "158 x 119", "160 x 120")
-
-
-def test_a_list_without_one_of_the_photographs_is_refused_by_name(save):
-    refused(save(NAMES, {"t.txt": LISTED.replace("a_3.png", "b_3.png")}), "t.txt", "a_3.png")
-
-
-def test_a_list_with_a_time_that_is_no_number_is_refused_by_name(save):
-    refused(save(NAMES, {"t.txt": LISTED.replace("a_3.png ", "a_3.png nan#")}), "t.txt", "a_3.png")
 
 
 def test_equal_times_are_refused_with_both_names(save):

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 TOLERANCE = 3  # pixel values by which JPEG changes a flat colour
+RINGING, REACH = 16, 4  # pixel values by which it changes one near its end, and how many pixels from there
 CONTRADICTION = 24  # pixel values by which another exposure must contradict a border
 MIN_SHARE = 0.002  # of the frame's pixels; less is not worth a mask
 MAX_SHARE = 0.5  # what covers more is no border
@@ -27,37 +28,50 @@ def find_borders(images, opaque) -> list[np.ndarray | None]:
     opaque : P arrays (H, W) bool, or None, outside of which a photograph is no evidence against another
     """
     edges, pixels = [_edge(image) for image in images], [image.reshape(-1, 3) for image in images]
-    edge_counts, counts = ([m if m is None else of(m) for m in opaque] for of in (_edge, np.ravel))
     colours = [_common_colours(edge) for edge in edges]
     count = Counter(colour for some in colours for colour in some)
-    valid = []
-    for j, image in enumerate(images):
-        inside = np.ones(image.shape[:2], dtype=bool)
+    # One colour at the edge of most exposures, though exposures differ: no light does that. First these, so that
+    # they do not count as evidence when the others are judged.
+    repeated = {
+        colour for colour, times in count.items() if times > len(images) / 2 and _neither_dark_nor_bright(colour)
+    }
+    valid = [
+        np.ones(image.shape[:2], dtype=bool) if o is None else o.copy() for image, o in zip(images, opaque, strict=True)
+    ]
+    for image, some, inside in zip(images, colours, valid, strict=True):
+        for colour in repeated.intersection(some):
+            for region in _regions_at_edge(image, colour, 0):
+                inside[_grown(image, colour, region)] = False
+
+    edge_counts, counts = [_edge(v) for v in valid], [v.ravel().copy() for v in valid]
+    for j, (image, inside) in enumerate(zip(images, valid, strict=True)):
         for colour in colours[j]:
-            # Black and white may be night and sun; one strong colour at the edge of most exposures is neither.
-            repeated = np.ptp(colour) > COLOURFUL and count[colour] > len(images) / 2
             there = np.flatnonzero(np.abs(edges[j].astype(np.int16) - colour).max(axis=1) <= TOLERANCE)
-            if not repeated and _impossible(edges, edge_counts, j, there) < SUSPICION:
+            if colour in repeated or _impossible(edges, edge_counts, j, there) < SUSPICION:
                 continue
-            for region in _regions_at_edge(image, colour):
+            for region in _regions_at_edge(image, colour, MIN_SHARE):
                 points = np.flatnonzero(region)
-                if repeated or _impossible(pixels, counts, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
-                    inside[region] = False
-        valid.append(None if inside.all() else inside)
-    return valid
+                if _impossible(pixels, counts, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
+                    inside[_grown(image, colour, region)] = False
+    return [None if inside.all() else inside for inside in valid]
+
+
+def _neither_dark_nor_bright(colour) -> bool:
+    """Whether a colour can't be night or sun: strongly coloured, or grey between black and white."""
+    return np.ptp(colour) > COLOURFUL or (min(colour) > 8 and max(colour) < 240)
 
 
 def _impossible(pixels, counts, j: int, points) -> float:
     """Share of points in photograph j that are darker than in a shorter exposure, or brighter than in a longer one.
 
     pixels : P arrays (n, 3) uint8, shortest exposure first; points : indices into n
-    counts : P arrays (n,) bool, which pixels are evidence, or None for all
+    counts : P arrays (n,) bool, which pixels are evidence
     """
     here = pixels[j][points].astype(np.int16)
     against = np.zeros(len(points), dtype=bool)
     for k, (other, solid) in enumerate(zip(pixels, counts, strict=True)):
         excess = ((other[points] - here) * np.sign(j - k)).max(axis=1)
-        against |= (excess > CONTRADICTION) & (True if solid is None else solid[points])
+        against |= (excess > CONTRADICTION) & solid[points]
     return float(against.mean())
 
 
@@ -74,12 +88,23 @@ def _common_colours(edge) -> list[tuple[int, int, int]]:
     return [(int(s) >> 16, int(s) >> 8 & 255, int(s) & 255) for s in shades[most[count[most] > len(edge) / 50]]]
 
 
-def _regions_at_edge(image, colour) -> Iterator[np.ndarray]:
+def _near(image, colour, distance: int) -> np.ndarray:
+    """(H, W) uint8, 255 where no channel is further than distance from a colour."""
+    low, high = (np.clip(np.add(colour, d), 0, 255).astype(np.float64) for d in (-distance, distance))
+    return cv2.inRange(image, low, high)
+
+
+def _regions_at_edge(image, colour, min_share: float) -> Iterator[np.ndarray]:
     """Connected regions, (H, W) bool, of one colour that touch the edge of the frame."""
-    low, high = (np.clip(np.add(colour, d), 0, 255).astype(np.float64) for d in (-TOLERANCE, TOLERANCE))
-    flat = cv2.inRange(image, low, high)
+    flat = _near(image, colour, TOLERANCE)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(flat, connectivity=4)
     for label, (left, top, width, height, area) in enumerate(stats[1:], 1):
         at_edge = left == 0 or top == 0 or left + width == image.shape[1] or top + height == image.shape[0]
-        if at_edge and MIN_SHARE < area / flat.size < MAX_SHARE:
+        if at_edge and min_share < area / flat.size < MAX_SHARE:
             yield labels == label
+
+
+def _grown(image, colour, region) -> np.ndarray:
+    """A region with what JPEG made of its rim, (H, W) bool."""
+    around = cv2.dilate(region.view(np.uint8), np.ones((2 * REACH + 1,) * 2, np.uint8))
+    return region | ((around > 0) & (_near(image, colour, RINGING) > 0))

@@ -116,15 +116,21 @@ def doubts(evidence: Evidence, times, names, source: str) -> list[str]:
         return []
     # One wrong time shows in two pairs, too long in one and too short in the other. Where it can be told
     # which photograph is off, most others agree with one another; pairs that were not measured cut the chain.
+    measured = np.nan_to_num(evidence.seen - evidence.claimed) / np.log(2)
     sentences = []
     cuts = np.flatnonzero(np.isnan(evidence.seen)) + 1
     for chain in np.split(np.arange(len(times)), cuts):
         off = np.concatenate([[0.0], np.cumsum(excess[chain[:-1]])])
         usual = max(off, key=lambda o: np.sum(np.abs(off - o) <= LIMIT / 2))
-        wrong = np.abs(off - usual) > LIMIT / 2
+        off -= usual
+        wrong = np.zeros(len(chain), dtype=bool)
+        for i in np.argsort(-np.abs(off)):  # no more photographs than it takes to explain every pair
+            unexplained = measured[chain[:-1]] - np.diff(np.where(wrong, off, 0))
+            if np.abs(off[i]) > LIMIT / 2 and np.any(np.abs(unexplained) > LIMIT):
+                wrong[i] = True
         if 0 < 3 * wrong.sum() < len(chain):
             for i in chain[wrong]:
-                fits = times[i] * 2.0 ** (off - usual)[i - chain[0]]
+                fits = times[i] * 2.0 ** off[i - chain[0]]
                 sentences.append(
                     f"{names[i]}: {times[i]:.4g} s by {source}, but it looks as if exposed for about {fits:.2g} s; "
                     "check its time."

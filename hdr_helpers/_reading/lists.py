@@ -21,7 +21,7 @@ UNITS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "秒": 1.0, "ms": 
 UNIT = "(" + "|".join(sorted(filter(None, UNITS), key=len, reverse=True)) + ")"
 TIME_TITLE = re.compile(r"shutter|time|expos|speed|sec|^t$", re.IGNORECASE)
 OTHER_TITLE = re.compile(r"f.?stop|f.?num|^f$|apert|iso|gain|^nd", re.IGNORECASE)
-FRACTION = re.compile(rf"(?:^|{SEPARATOR})[\d.]+/[\d.]+{UNIT}?(?=$|{SEPARATOR})")
+IN_SECONDS = re.compile(rf"(?:^|{SEPARATOR})(?:[\d.]+/[\d.]+{UNIT}?|[\d.]+\s*{UNIT})(?=$|{SEPARATOR})")
 MAX_TEXT = 2**18  # bytes; a longer file is no list of exposure times
 MAX_NAME = 1000  # characters before a suffix in which the name of a photograph is looked for
 
@@ -51,8 +51,8 @@ def text_values(file: str, data: bytes, names: list[str]) -> Listed | None:
     split = [(place, *_split_row(row, stems)) for place, row in rows]
     named = [(place, label, numbers or []) for place, label, numbers in split if label]
     bare = [(place, numbers) for place, label, numbers in split if not label]
-    # 1/60 can only be seconds; 0.5 and 60 may be anything.
-    kind = SECONDS if any(FRACTION.search(row) for _, row in rows) else OPEN
+    # 1/60 and 0.5 s can only be seconds; 0.5 and 60 may be anything.
+    kind = SECONDS if any(IN_SECONDS.search(row) for _, row in rows) else OPEN
     if any(numbers for _, _, numbers in named):
         values, places = _by_name(file, named, names, _titles(text))
         return Listed(values, places, kind)

@@ -17,6 +17,7 @@ from hdr_helpers._reading.pictures import Exif
 
 ROUNDING = 0.05  # cameras print rounded times; two sources that differ by more are both reported
 MIN_AGREEMENT = 0.5  # of the order of times with the order of brightness: 1 is the same, -1 reversed
+TIE = 0.5  # pixel values; where means are closer than that, noise decides which photograph is brighter
 EV_STEP, EV_REACH = 0.25, 24  # EV lists have no finer steps, and no camera reaches further
 
 
@@ -61,7 +62,7 @@ def find_times(path, names, texts, exif: list[Exif], histograms) -> Times:
     chosen = candidates.pop(first)
     notes = [*chosen.times.notes, *chosen.doubts, *map(str, misfits)]
     for trusted in candidates[:first]:
-        notes.append(f"Set aside: {trusted.times.source}. {trusted.doubts[0]}")
+        notes.append(f"Set aside: {trusted.times.source}. {' '.join(trusted.doubts)}")
     for other in candidates:
         notes += _differences(names, chosen.times, other.times)
     return chosen.times._replace(notes=notes)
@@ -165,7 +166,8 @@ def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, l
         notes.append(f"The numbers of {source} are EV steps; times are relative, 2 to the EV.")
 
     gains = np.ones(len(values))
-    if camera.gains is not None and not camera.is_exposure(values):
+    inverse = 1 / values if listed.kind == OPEN and not as_stops else values
+    if camera.gains is not None and not camera.is_exposure(values) and not camera.is_exposure(inverse):
         gains = camera.gains
         notes.append(camera.note)
     if listed.kind == OPEN and not as_stops and _agreement(values * gains, brightness) <= -MIN_AGREEMENT:
@@ -179,9 +181,11 @@ def _capital(sentence: str) -> str:
 
 
 def _agreement(values, brightness) -> float:
-    """1 where the larger value is the brighter photograph for every pair, -1 where for none."""
+    """1 where the larger value is the brighter photograph for every pair, -1 where for none; a tie does no harm."""
     i, j = np.triu_indices(len(values), 1)
-    return float(np.mean(np.sign(values[j] - values[i]) * np.sign(brightness[j] - brightness[i])))
+    brighter = brightness[j] - brightness[i]
+    agrees = np.where(np.abs(brighter) < TIE, 1, np.sign(values[j] - values[i]) * np.sign(brighter))
+    return float(agrees.mean())
 
 
 def _may_be_stops(values, brightness) -> bool:
