@@ -15,7 +15,7 @@ import numpy as np
 DARKEST, BRIGHTEST = 24, 240  # pixel values between which a photograph can be trusted
 MIN_LEVELS, MIN_PIXELS = 6, 300  # what a pair must have in common to be measured
 LIMIT = 0.7  # stops; response, noise and a moved camera leave up to half a stop in real sets
-TYPICAL = np.array([1.2, 1.4, 1.0, 0.0])  # of BASIS: near the middle of the cameras that were measured
+TYPICAL = np.array([1.2, 1.4, 1.0, 0.0])  # on _basis: near the middle of the cameras that were measured
 PRIOR = 0.5  # weight of the typical response, in pairs; decides only where pairs are few
 
 
@@ -52,31 +52,40 @@ def measure(histograms, times) -> Evidence:
     steps = [_basis(there) - _basis(here) for here, there in pairs]
     known = [j for j, step in enumerate(steps) if len(step)]
     seen = np.full(len(claimed), np.nan)
-    if not known:
-        return Evidence(claimed, seen)
+    if known:
+        response = _fit_response(steps, known, np.log(times))
+        seen[known] = [np.median(steps[j] @ response) for j in known]
+    return Evidence(claimed, seen)
 
-    # Unknown: the response, and one constant for every chain of photographs without a gap.
+
+def _fit_response(steps, known, log_times) -> np.ndarray:
+    """Coefficients of the log inverse response on _basis, (4,), that most of the times agree with.
+
+    steps : P-1 arrays (n, 4), what a change from one photograph to the next adds to each function of _basis
+    known : indices of the pairs where n > 0; log_times : (P,) ln seconds
+    """
     size = len(TYPICAL)
     mean = np.array([step.mean(axis=0) if len(step) else np.zeros(size) for step in steps])
+    # Unknown beside the response: one constant for every chain of photographs without a gap.
     chain = np.concatenate([[0], np.cumsum([len(step) == 0 for step in steps])])
-    from_start = np.concatenate([np.zeros((1, size)), np.cumsum(mean, axis=0)])
-    n_chains = chain[-1] + 1
+    constants = chain[-1] + 1
+    since_first = np.concatenate([np.zeros((1, size)), np.cumsum(mean, axis=0)])
     # By least absolute deviations: the log time of every photograph, which a swap of two can't bend, and the
     # step of every pair, which a wrong first or last can't bend.
-    robust = np.vstack([np.hstack([from_start, np.eye(n_chains)[chain]]), np.pad(mean[known], ((0, 0), (0, n_chains)))])
-    claims = np.concatenate([np.log(times), claimed[known]])
+    photographs = np.hstack([since_first, np.eye(constants)[chain]])
+    robust = np.vstack([photographs, np.pad(mean[known], ((0, 0), (0, constants)))])
+    claims = np.concatenate([log_times, np.diff(log_times)[known]])
     # By least squares: all values of a pair agree on its step, and the response is not far from typical.
-    flat = [(steps[j] - mean[j]) / np.sqrt(len(steps[j])) for j in known]
-    smooth = np.pad(np.concatenate([*flat, PRIOR * np.eye(size)]), ((0, 0), (0, n_chains)))
+    within = [(steps[j] - mean[j]) / np.sqrt(len(steps[j])) for j in known]
+    smooth = np.pad(np.concatenate([*within, PRIOR * np.eye(size)]), ((0, 0), (0, constants)))
     wanted = np.concatenate([np.zeros(len(smooth) - size), PRIOR * TYPICAL])
     weights = np.ones(len(claims))
-    for least in np.geomspace(2, 0.05, 40):  # reweighted least squares, ever less smooth
+    for least in np.geomspace(2, 0.05, 40):  # reweighted least squares, ever nearer to absolute deviations
         root = np.sqrt(weights)
         A, b = np.concatenate([root[:, None] * robust, smooth]), np.concatenate([root * claims, wanted])
         x = np.linalg.lstsq(A, b, rcond=None)[0]
         weights = 1 / np.maximum(np.abs(robust @ x - claims), least)
-    seen[known] = [np.median(steps[j] @ x[:size]) for j in known]
-    return Evidence(claimed, seen)
+    return x[:size]
 
 
 def looks_brighter(first, second) -> float:
