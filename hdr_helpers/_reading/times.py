@@ -172,7 +172,7 @@ def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, l
         notes.append(camera.note)
     if listed.kind == OPEN and not as_stops and _agreement(values * gains, brightness) <= -MIN_AGREEMENT:
         values = 1 / values
-        notes.append(f"The numbers of {source} are 1/seconds: the photographs get darker as they grow.")
+        notes.append(f"The numbers of {source} are 1/seconds: the larger the number, the darker the photograph.")
     return values * gains, notes
 
 

@@ -1,11 +1,12 @@
-"""Is everything there that the course needs?"""
+"""Is everything there that the course needs? Imports nothing of it, so that it can say what is missing."""
 
 import sys
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
-from hdr_helpers.lab.data import DATA
-
+CHAPEL = Path(__file__).parents[2] / "data" / "chapel"
 PACKAGES = ("numpy", "scipy", "opencv-python-headless", "matplotlib", "jupyterlab", "nbval", "ipywidgets")
+COURSE = "hdr-helpers"
 
 
 def check_environment() -> None:
@@ -15,15 +16,15 @@ def check_environment() -> None:
             "Python 3.11 or newer",
             sys.version_info >= (3, 11),
             sys.version.split()[0],
-            "install a newer Python",
+            "install a newer Python, then make the environment again",
         )
     ]
-    for package in PACKAGES:
+    for package in (*PACKAGES, COURSE):
         try:
             rows.append((package, True, version(package), ""))
         except PackageNotFoundError:
-            rows.append((package, False, "missing", "run: pip install -r environment.txt"))
-    there = (DATA / "chapel" / "shutter.txt").is_file()
+            rows.append((package, False, "missing", "python -m pip install -r environment.txt"))
+    there = (CHAPEL / "shutter.txt").is_file()
     rows.append(("data/chapel", there, "found" if there else "missing", "fetch the course folder again"))
     for name, fine, found, remedy in rows:
         print(f"{'✓' if fine else '✗'} {name:24} {found}{'' if fine else '  -> ' + remedy}")

@@ -13,15 +13,16 @@ from hdr_helpers.lab.figures.crf import (
     sampling_figure,
 )
 from hdr_helpers.lab.figures.load import (
-    TOO_BRIGHT,
-    TOO_DARK,
     clipping_overlay,
     clipping_strip_figure,
     histogram_figure,
+    iso_figure,
+    one_photo_errors,
     one_photo_figure,
     pixel_figure,
     strip_figure,
     transfer_figure,
+    usable_share,
 )
 from hdr_helpers.lab.figures.merge import (
     error_figure,
@@ -34,8 +35,6 @@ from hdr_helpers.lab.figures.style import jpeg_bytes, pictures_figure, png_bytes
 from hdr_helpers.lab.figures.tonemap import curve_figure, eight_bits_figure
 
 __all__ = [
-    "TOO_BRIGHT",
-    "TOO_DARK",
     "bitmaps_figure",
     "clipping_overlay",
     "clipping_strip_figure",
@@ -51,8 +50,10 @@ __all__ = [
     "hand_figure",
     "histogram_figure",
     "honest_figure",
+    "iso_figure",
     "jpeg_bytes",
     "matrix_figure",
+    "one_photo_errors",
     "one_photo_figure",
     "pictures_figure",
     "pixel_estimates_figure",
@@ -64,5 +65,6 @@ __all__ = [
     "show",
     "strip_figure",
     "transfer_figure",
+    "usable_share",
     "viewed_at",
 ]

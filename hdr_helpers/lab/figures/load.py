@@ -1,11 +1,14 @@
 """Figures of stage 1: exposures, histograms, clipping, what one photograph knows."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from matplotlib import patheffects
 
 from hdr_helpers._reading.evidence import transfer
 from hdr_helpers.crf import CLIPPED, NOISE
+from hdr_helpers.lab.camera import Camera, scene
 from hdr_helpers.lab.figures.style import (
     ACCENT,
     BRIGHT_MARK,
@@ -23,6 +26,8 @@ from hdr_helpers.lab.figures.style import (
 )
 from hdr_helpers.lab.metrics import radiance_error
 
+CURVES = (("gamma 2.2, a guess", BRIGHT_MARK, ""), ("the camera's true curve", "#009E73", "//"))
+PREVIEW = 800  # pixels across of a single photograph
 TILE = 320  # pixels across of a photograph on a contact sheet
 TOO_DARK, TOO_BRIGHT = NOISE + 1, CLIPPED  # pixel values below and from which a JPEG says nothing to rely on
 
@@ -45,19 +50,29 @@ def clipping_overlay(image):
     return marked
 
 
+def _small(image, width: int):
+    """A picture at most so wide, shrunk without averaging, so that what is clipped stays clipped."""
+    scale = min(1, width / image.shape[1])
+    return cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+
+
 def histogram_figure(image, time):
-    """A photograph with its unusable pixels striped, beside its histograms."""
+    """A photograph, (H, W, 3) uint8, with its unusable pixels striped, beside its histograms."""
     fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.4, 1])
     bare(left)
-    left.imshow(clipping_overlay(image))
+    left.imshow(clipping_overlay(_small(image, PREVIEW)))
     left.set_title("striped: too dark (blue) or too bright (orange)", fontsize=10)
     _draw_histogram(right, image)
     right.set(xlabel="pixel value", ylabel="share of pixels (%)")
     right.legend(frameon=False, loc="upper center")
-    usable = ((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2).mean()
-    right.set_title(f"{usable:.0%} of the pixels usable", fontsize=10)
+    right.set_title(f"{usable_share(image):.0%} of the pixels usable", fontsize=10)
     headline(fig, f"exposure time {seconds(time)}")
     return fig
+
+
+def usable_share(image) -> float:
+    """Share of the pixels of a photograph, (H, W, 3) uint8, that are usable in all three channels."""
+    return float(((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2).mean())
 
 
 def clipping_strip_figure(bracket, which):
@@ -66,13 +81,12 @@ def clipping_strip_figure(bracket, which):
     which : indices of the photographs
     """
     bracket = bracket.in_8_bits()
-    height, width = (TILE * np.array(bracket.images[0].shape[:2]) / bracket.images[0].shape[1]).astype(int).tolist()
-    fig, axes = new_figure(2, len(which), WIDTH / len(which) * height / width + 2.5, height_ratios=[1, 1.2])
+    aspect = bracket.images[0].shape[0] / bracket.images[0].shape[1]
+    fig, axes = new_figure(2, len(which), WIDTH / len(which) * aspect + 2.5, height_ratios=[1, 1.2])
     for i, (above, below) in zip(which, axes.T, strict=True):
         image = bracket.images[i]
         bare(above)
-        # Shrunk without averaging, so that what is clipped stays clipped; then striped, so that stripes are seen.
-        above.imshow(clipping_overlay(cv2.resize(image, (width, height), interpolation=cv2.INTER_NEAREST)))
+        above.imshow(clipping_overlay(_small(image, TILE)))
         above.set_title(seconds(bracket.times[i]), fontsize=10)
         _draw_histogram(below, image)
         below.set(xticks=(0, 128, 255), xlabel="pixel value", ylabel="share of pixels (%)")
@@ -100,7 +114,7 @@ def transfer_figure(bracket, j):
     joint = np.histogram2d(images[j + 1].ravel(), images[j].ravel(), bins=256, range=((0, 256), (0, 256)))[0]
     fig, (left, right) = new_figure(1, 2, 4.6)
     left.imshow(np.log1p(joint), origin="lower", cmap="Greys", extent=(0, 256, 0, 256))
-    left.set_title("every pixel of the picture, and the curve of the histograms", fontsize=10)
+    left.set_title("grey: all pixels; line: from the two histograms alone", fontsize=10)
     left.set_ylabel(f"pixel value at {seconds(times[j + 1])}")
     for ax, steps in ((left, (1,)), (right, (1, 2, 3))):
         for k, (colour, style, _) in zip(steps, THREE, strict=False):
@@ -114,17 +128,29 @@ def transfer_figure(bracket, j):
         ax.legend(frameon=False, loc="lower right", fontsize=9)
     right.set(ylabel="pixel value in the other photograph")
     right.set_title("the longer the exposure, the further from equal", fontsize=10)
-    headline(fig, "What a pixel value becomes in another exposure depends on the value alone")
+    headline(fig, "Pixels that are equal in one photograph are equal in the next; a longer time lifts the curve")
     return fig
 
 
-def pixel_figure(bracket, points):
-    """Three pixels followed through all exposures. points : name -> (row, column)"""
+def iso_figure():
+    """A dim part of the chapel twice, equally bright, the second time from a sixteenth of the photons."""
+    part = scene("chapel")[220:340, 180:360]
+    camera = Camera(jpeg_quality=None)
+    cameras = camera, replace(camera, full_well=camera.full_well / 16)  # fewer photons to a pixel value
+    pictures = [c.photograph(0.15 * part / part.mean(), frame=0) for c in cameras]
+    titles = ["ISO 100, 1/4 s", "ISO 1600, 1/64 s"]
+    return pictures_figure(
+        pictures, titles, title="The same brightness from a sixteenth of the light: noise, most of all in the dark"
+    )
+
+
+def pixel_figure(bracket, points, title="One curve for each pixel, at a different place on the axis of time"):
+    """Up to three pixels followed through all exposures. points : name -> (row, column)"""
     bracket = bracket.in_8_bits()
     fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.3, 1])
     bare(left)
     left.imshow(bracket.images[len(bracket) // 2 + 1])
-    for (name, (row, col)), (colour, style, marker) in zip(points.items(), THREE, strict=True):
+    for (name, (row, col)), (colour, style, marker) in zip(points.items(), THREE, strict=False):
         left.plot(col, row, marker, ms=11, mfc="none", mec="white", mew=4)
         left.plot(col, row, marker, ms=11, mfc="none", mec=colour, mew=2)
         label = left.annotate(name, (col, row), (10, 8), textcoords="offset points", color="white", weight="bold")
@@ -134,31 +160,40 @@ def pixel_figure(bracket, points):
     right.set(xscale="log", xlabel="exposure time (s)", ylabel="pixel value (green)", ylim=(-5, 262))
     right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
     plain(right)
-    headline(fig, "No single exposure measures all three pixels")
+    headline(fig, title)
     return fig
 
 
 def one_photo_figure(bracket):
-    """How much of the scene each photograph alone gets right, against the truth of a virtual camera."""
-    usable, wrong = [], []
-    for image, time in zip(bracket.images, bracket.times, strict=True):
-        inside = ((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2)
-        guess = np.maximum(image / np.float32(255), 1 / 512) ** 2.2 / time
-        usable.append(100 * inside.mean())
-        wrong.append(radiance_error(guess, bracket.truth.radiance).p95)
-    fig, (left, right) = new_figure(1, 2, 3.2)
+    """What each photograph alone says of the scene, against the truth of a virtual camera."""
     labels = [seconds(t) for t in bracket.times]
-    for ax, values, colour, unit in (
-        (left, usable, DARK_MARK, "%.0f%%"),
-        (right, wrong, BRIGHT_MARK, "%.1f"),
-    ):
-        ax.bar_label(ax.bar(labels, values, color=colour, edgecolor=INK), fmt=unit, fontsize=9)
+    errors = one_photo_errors(bracket)
+    fig, (left, right) = new_figure(1, 2, 3.4)
+    bars = left.bar(labels, [100 * usable_share(image) for image in bracket.images], color=DARK_MARK, edgecolor=INK)
+    left.bar_label(bars, fmt="%.0f%%", fontsize=9)
+    left.set(ylabel="usable pixels (%)", ylim=(0, 105))
+    left.set_title("what each photograph holds", fontsize=10)
+    places = np.arange(len(labels))
+    for shift, (name, colour, hatch), wrong in zip((-0.2, 0.2), CURVES, zip(*errors, strict=True), strict=True):
+        worst = [error.p95 for error in wrong]
+        right.bar(places + shift, worst, 0.4, color=colour, hatch=hatch, edgecolor=INK, label=name)
+    right.set(ylabel="error, 95th percentile (stops)", xticks=places, xticklabels=labels, ylim=(0, 7.5))
+    right.legend(frameon=False, fontsize=9, loc="upper right")
+    right.set_title("how wrong it is when taken for the whole scene", fontsize=10)
+    for ax in (left, right):
         ax.tick_params(axis="x", rotation=45)
         plain(ax)
         ax.grid(False)
-    left.set(ylabel="usable pixels (%)", ylim=(0, 105))
-    right.set(ylabel="error, 95th percentile (stops)")
-    left.set_title("what each photograph holds", fontsize=10)
-    right.set_title("how wrong it is when taken for the whole scene", fontsize=10)
-    headline(fig, "In its worst twentieth every photograph alone is stops away from the truth")
+    headline(fig, "Neither the range nor the curve can be had from one photograph")
     return fig
+
+
+def one_photo_errors(bracket) -> list[tuple]:
+    """For each photograph the RadianceError of two guesses: by a gamma of 2.2, and by the camera's true curve."""
+    crf, truth = bracket.truth.crf, bracket.truth.radiance
+    errors = []
+    for image in bracket.images:
+        by_gamma = np.maximum(image / np.float32(255), 1 / 512) ** 2.2  # value 0 is not zero light
+        by_curve = np.exp(np.stack([g[image[..., c]] for c, g in enumerate(crf)], axis=-1))
+        errors.append((radiance_error(by_gamma, truth), radiance_error(by_curve, truth)))
+    return errors
