@@ -3,7 +3,9 @@
 How files are read, times are found and doubted, and borders are recognised is in the rooms of _reading/.
 """
 
+from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from hdr_helpers._reading import IMAGE_SUFFIXES, TEXT_SUFFIXES, BracketError
 from hdr_helpers._reading.borders import find_borders
 from hdr_helpers._reading.files import bracket_files, is_photograph, natural
 from hdr_helpers._reading.pictures import decode
-from hdr_helpers._reading.times import find_times
+from hdr_helpers._reading.times import Times, find_times
 
 __all__ = ["Bracket", "BracketError", "Truth", "in_8_bits", "load_bracket"]
 
@@ -31,7 +33,7 @@ class Truth:
     shifts: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bracket:
     """Photographs of one scene, shortest exposure first.
 
@@ -58,7 +60,8 @@ class Bracket:
     truth: Truth | None = None
 
     def __post_init__(self):
-        times = np.asarray(self.times, dtype=np.float64)
+        times = np.array(self.times, dtype=np.float64)
+        times.flags.writeable = False
         if not len(self.images) == len(times) == len(self.names):
             raise BracketError(
                 f"{len(self.images)} images, {len(times)} times and {len(self.names)} names were given; "
@@ -67,12 +70,17 @@ class Bracket:
         if len(times) < 2:
             raise BracketError("A bracket needs at least two photographs with different exposure times.")
         for name, image in zip(self.names, self.images, strict=True):
-            _check_alike(name, image, self.names[0], self.images[0])
+            if image.dtype not in (np.uint8, np.uint16) or image.shape[2:] != (3,):
+                raise BracketError(
+                    f"{name} is {image.dtype} {image.shape}; photographs are (H, W, 3), uint8 or uint16."
+                )
+        _check_alike(self.names, self.images)
         if not np.all(np.isfinite(times)) or times[0] <= 0 or np.any(np.diff(times) <= 0):
             raise BracketError(f"Exposure times must be positive and strictly ascending; got {times.tolist()} seconds.")
-        shapes = [mask.shape for mask in self.valid] if self.valid is not None else []
-        if shapes and shapes != [image.shape[:2] for image in self.images]:
-            raise BracketError(f"valid must hold one mask of {self.images[0].shape[:2]} for each photograph.")
+        if self.valid is not None:
+            object.__setattr__(self, "valid", tuple(np.asarray(mask, dtype=bool) for mask in self.valid))
+            if [mask.shape for mask in self.valid] != [image.shape[:2] for image in self.images]:
+                raise BracketError(f"valid must hold one mask of {self.images[0].shape[:2]} for each photograph.")
         object.__setattr__(self, "times", times)
 
     def __len__(self):
@@ -103,7 +111,19 @@ def load_bracket(path) -> Bracket:
     change, times are exposures: t ISO / N^2.
     Raises BracketError where the photographs or the times can't be used; nothing is loaded then.
     """
-    path = Path(path)
+    try:
+        path = Path(path).expanduser()
+    except (TypeError, RuntimeError):
+        raise BracketError(f"{path!r} is no path; give the folder or zip that holds the photographs.") from None
+    try:
+        return _load(path)
+    except MemoryError:
+        raise BracketError(
+            f"The photographs of {path} do not fit into memory; scale them down, or take fewer."
+        ) from None
+
+
+def _load(path: Path) -> Bracket:
     files = bracket_files(path)
     names = sorted(filter(is_photograph, files), key=natural)
     if len(names) < 2:
@@ -112,59 +132,101 @@ def load_bracket(path) -> Bracket:
             f"{', '.join(IMAGE_SUFFIXES)} in one folder. HEIC and raw files have to be exported as JPEG first."
         )
     texts = {n: files[n]() for n in sorted(files) if n.lower().endswith(TEXT_SUFFIXES)}
-    try:
-        photographs = []
-        for name in names:
-            photographs.append(decode(name, files[name]()))
-            _check_alike(name, photographs[-1].image, names[0], photographs[0].image)
-        small = [in_8_bits(p.image) for p in photographs]
-    except MemoryError:
-        raise BracketError(
-            f"The {len(names)} photographs in {path} do not fit into memory; scale them down, or take fewer."
-        ) from None
+    photographs = [decode(name, files[name]()) for name in names]
+    _check_alike(names, [p.image for p in photographs])
+    images, deep = _all_bits([p.image for p in photographs])
+    small = [in_8_bits(image) for image in images]
 
-    times = find_times(path, names, texts, [p.exif for p in photographs], np.array([_histogram(i) for i in small]))
+    find = partial(find_times, path, names, texts, [p.exif for p in photographs])
+    times, masks = _times_and_borders(find, small, [p.opaque for p in photographs])
     order = np.argsort(times.seconds)
-    valid, borders = _valid([small[i] for i in order], [photographs[i].opaque for i in order])
+    names = tuple(names[i] for i in order)
+    valid, borders = _valid(names, [masks[i] for i in order], small[0].shape[:2])
     return Bracket(
-        images=tuple(photographs[i].image for i in order),
+        images=tuple(images[i] for i in order),
         times=times.seconds[order],
-        names=tuple(names[i] for i in order),
+        names=names,
         source=times.source,
         places=tuple(times.places[i] for i in order),
-        notes=(*times.notes, *borders),
+        notes=(*deep, *times.notes, *borders),
         valid=valid,
     )
 
 
-def _histogram(image) -> np.ndarray:
-    """(256,) counts of the green values, the channel with the least noise, of about a million pixels."""
-    stride = max(1, int(np.sqrt(image[..., 1].size / 1e6)))
-    return np.bincount(image[::stride, ::stride, 1].ravel(), minlength=256)
+def _times_and_borders(find, images, opaque) -> tuple[Times, list[np.ndarray | None]]:
+    """Exposure times, and where each photograph is one, as find_borders gives it; both in the order of images.
+
+    find : from histograms (P, 256) to Times
+    A wrong time looks like a border, for light can't explain its photograph; and borders make right times look
+    wrong. So where times are in doubt, borders are believed if without them the doubt is gone.
+    """
+    times = find(_histograms(images, opaque))
+    masks = _borders(images, opaque, times)
+    if not times.doubted or all(mask is None for mask in masks):
+        return times, masks
+    common = np.logical_and.reduce([mask for mask in masks if mask is not None])
+    again = find(_histograms(images, [common] * len(images)))
+    return (again, masks) if not again.doubted else (times, _borders(images, opaque, times, doubted=True))
 
 
-def _valid(images, opaque) -> tuple[tuple[np.ndarray, ...] | None, list[str]]:
-    """Bracket.valid from borders and transparency, and a note where there is something to say."""
-    masks = find_borders(images, opaque)
-    marked = sum(mask is not None for mask in masks)
+def _borders(images, opaque, times, doubted=False) -> list[np.ndarray | None]:
+    """find_borders for images in any order."""
+    order = np.argsort(times.seconds)
+    found = find_borders([images[i] for i in order], [opaque[i] for i in order], doubted)
+    return [found[place] for place in np.argsort(order)]
+
+
+def _histograms(images, masks) -> np.ndarray:
+    """(P, 256) counts of the green values, the channel with the least noise, of about a million pixels each."""
+    stride = max(1, int(np.sqrt(images[0][..., 1].size / 1e6)))
+    few = np.s_[::stride, ::stride]
+    values = [
+        image[..., 1][few].ravel() if mask is None else image[..., 1][few][mask[few]]
+        for image, mask in zip(images, masks, strict=True)
+    ]
+    return np.array([np.bincount(v, minlength=256) for v in values])
+
+
+def _all_bits(images) -> tuple[list[np.ndarray], list[str]]:
+    """The images with their values spread over all 16 bits, if they stand in the lowest ones; and a note then."""
+    if images[0].dtype != np.uint16:
+        return images, []
+    bits = max(int(max(image.max() for image in images)).bit_length(), 8)
+    if bits > 14:
+        return images, []
+    factor = 2 ** (16 - bits)
+    note = f"The 16-bit files hold values of {bits} bits only, up to {2**bits - 1}; they were multiplied by {factor}."
+    return [image * np.uint16(factor) for image in images], [note]
+
+
+def _valid(names, masks, shape) -> tuple[tuple[np.ndarray, ...] | None, list[str]]:
+    """Bracket.valid from masks, None where all of a photograph is one, and a note where there is something to say.
+
+    Raises BracketError where no pixel is valid in all photographs.
+    """
+    marked = [name for name, mask in zip(names, masks, strict=True) if mask is not None]
     if not marked:
         return None, []
-    everywhere = np.ones(images[0].shape[:2], dtype=bool)
+    everywhere = np.ones(shape, dtype=bool)
     masks = tuple(everywhere if mask is None else mask for mask in masks)
     share = 1 - np.logical_and.reduce(masks).mean()
-    return masks, [
-        f"{marked} of {len(masks)} photographs have borders that are no photograph, {share:.1%} of the frame "
-        "altogether; they are left out."
-    ]
-
-
-def _check_alike(name, image, first_name, first) -> None:
-    if image.shape != first.shape or image.dtype != first.dtype:
+    if share == 1:
         raise BracketError(
-            f"{name} is {_form(image)}, {first_name} is {_form(first)}; "
-            "all photographs of a bracket must have the same size and depth."
+            f"No part of the frame is opaque in all photographs, {marked[0]} among them; a bracket shows one view, "
+            "not the parts of a panorama."
         )
+    which = f"{', '.join(marked[:3])}{f' and {len(marked) - 3} more' if len(marked) > 3 else ''}"
+    edges = "an edge of one colour, or transparent, as an alignment leaves it, is not used"
+    return masks, [f"{which}: {edges} ({share:.1%} of the frame)."]
 
 
-def _form(image: np.ndarray) -> str:
-    return f"{image.shape[1]} x {image.shape[0]} pixels of {8 * image.itemsize} bits"
+def _check_alike(names, images) -> None:
+    """Raise BracketError unless all images have one form, naming one that differs from most."""
+    forms = [f"{i.shape[1]} x {i.shape[0]} pixels of {8 * i.itemsize} bits" for i in images]
+    usual = Counter(forms).most_common(1)[0][0]
+    for name, form in zip(names, forms, strict=True):
+        if form != usual:
+            raise BracketError(
+                f"{name} is {form}, {names[forms.index(usual)]} is {usual}; "
+                "take it out of the folder, or export all photographs with one size and depth."
+            )

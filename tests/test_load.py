@@ -2,6 +2,7 @@
 
 import json
 import struct
+import unicodedata
 import zipfile
 
 import cv2
@@ -37,6 +38,14 @@ def zipped(folder, target, inside="", also=()):
             archive.writestr(name, b"not a picture")
         for path in folder.iterdir():
             archive.write(path, inside + path.name)
+    return target
+
+
+def zipped_tree(folder, target):
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    with zipfile.ZipFile(target, "w") as archive:
+        for path in files:
+            archive.write(path, path.relative_to(folder))
     return target
 
 
@@ -164,6 +173,93 @@ def test_a_json_file_about_something_else_does_no_harm(save, text):
     assert load_bracket(save(NAMES, {"settings.json": text, "times.txt": LISTED})).names == NAMES
 
 
+ALSO = {
+    "tabs and decimal commas": "a_1.png\t0,0025\na_2.png\t0,0167\na_3.png\t0,1\na_4.png\t0,6\n",
+    "a CSV with quoted decimal commas": 'a_1.png,"0,0025"\na_2.png,"0,0167"\na_3.png,"0,1"\na_4.png,"0,6"\n',
+    "a decimal comma a line": "0,0025\n0,0167\n0,1\n0,6\n",
+    "full-width punctuation": "a_1.png：1/400\na_2.png：1/60\na_3.png，1/10\na_4.png，0.6\n",
+    "typographic fractions": "1⁄400 1⁄60 1⁄10 0.6",
+    "names without suffix and equal signs": "a_1=1/400\na_2=1/60\na_3=1/10\na_4=0.6\n",
+    "ISO before the fraction": "a_1.png,100,1/400\na_2.png,200,1/60\na_3.png,400,1/10\na_4.png,800,6/10\n",
+    "dates and times of day": "".join(f"{n},2024:04:05 12:30:{59 - i},{t}\n" for i, (n, t) in enumerate(KNOWN.items())),
+}
+
+
+@pytest.mark.parametrize("text", ALSO.values(), ids=ALSO.keys())
+def test_a_list_may_also_be_written_with(save, text):
+    np.testing.assert_allclose(load_bracket(save(NAMES, {"t.txt": text})).times, TIMES, rtol=0.01)
+
+
+def test_seconds_as_cameras_show_them_are_read(save):
+    bracket = load_bracket(save(("a_1.png", "a_2.png", "a_3.png"), {"t.txt": '0"3 1"8 10"'}))
+    np.testing.assert_allclose(bracket.times, (0.3, 1.8, 10))
+
+
+@pytest.mark.parametrize("key", ["iso", "f_number"])
+def test_in_json_the_keys_say_which_number_is_the_time(save, key):
+    rows = [{"file": n, key: 100 * 2**i, "exposure_time": t} for i, (n, t) in enumerate(KNOWN.items())]
+    np.testing.assert_allclose(load_bracket(save(NAMES, {"t.json": json.dumps(rows)})).times, TIMES)
+
+
+def test_signs_in_file_names_are_ev_steps(save):
+    names = ("a_-2.5.png", "a_0.0.png", "a_+2.5.png", "a_+5.0.png")
+    bracket = load_bracket(save(names))
+    assert bracket.names == names
+    np.testing.assert_allclose(bracket.times, [2**-2.5, 1, 2**2.5, 32])
+
+
+def test_numbers_of_photographs_without_suffix_are_names(save):
+    bracket = load_bracket(save(("1.png", "2.png", "3.png", "4.png"), {"t.txt": "1 1/400\n2 1/60\n3 1/10\n4 0.6\n"}))
+    np.testing.assert_allclose(bracket.times, TIMES)
+
+
+def test_a_name_in_another_unicode_form_is_the_same_name(save):
+    composed, apart = "Küche", unicodedata.normalize("NFD", "Küche")
+    folder = save([f"{apart}{i}.png" for i in range(4)])
+    lines = "".join(f"{composed}{i}.png {t}\n" for i, t in enumerate(TIMES))
+    (folder / "t.txt").write_text(lines, encoding="utf-8")
+    np.testing.assert_allclose(load_bracket(folder).times, TIMES)
+
+
+def test_1_over_t_is_recognised_though_two_photographs_are_equally_black(save, small_bracket):
+    folder = save(("a_1.png", "a_2.png", "a_3.png"), {"t.txt": "4000 1000 1"})
+    for name in ("a_1.png", "a_2.png"):
+        cv2.imwrite(str(folder / name), np.zeros_like(small_bracket.images[0]))
+    np.testing.assert_allclose(load_bracket(folder).times, (1 / 4000, 1 / 1000, 1))
+
+
+def test_counters_with_a_decimal_point_give_way_to_exif(tmp_path, small_bracket):
+    for name, image, denominator in zip(("12.30", "12.31", "12.33"), small_bracket.images, (400, 60, 10), strict=False):
+        write_with_exif(tmp_path / f"Shot {name}.png", image, exif_block(1, denominator, "<"))
+    bracket = load_bracket(tmp_path)
+    np.testing.assert_allclose(bracket.times, (1 / 400, 1 / 60, 1 / 10))
+    assert any(note.startswith("Not used: the file names") and "stops apart" in note for note in bracket.notes)
+
+
+def test_one_photograph_without_exif_is_named(tmp_path, small_bracket):
+    for i, denominator in enumerate((400, 60, 10)):
+        write_with_exif(tmp_path / f"IMG_{i}.png", small_bracket.images[i], exif_block(1, denominator, "<"))
+    cv2.imwrite(str(tmp_path / "result.png"), small_bracket.images[2])
+    refused(tmp_path, "result.png", "1 of 4", "take it out")
+
+
+def test_ev_steps_in_another_order_than_the_names_are_refused_with_the_order_that_was_read(save):
+    folder = save(("a_2.png", "a_1.png", "a_3.png"), {"ev.txt": "-2 0 2"})  # shot as 0, -2, +2
+    refused(folder, "ev.txt", "a_1.png -2, a_2.png 0", "beside the name")
+
+
+@pytest.mark.parametrize("text", ["1/400 1/60 1/10", "1/400 1/60 1/10 0.6 4"])
+def test_a_list_of_the_wrong_length_is_refused_with_both_numbers(save, text):
+    refused(save(NAMES, {"t.txt": text}), "t.txt", f"{len(text.split())} numbers for 4 photographs", "a_1.png, a_2.png")
+
+
+def test_a_list_beside_the_folder_of_photographs_is_read(save, tmp_path):
+    save(NAMES, folder="images")
+    (tmp_path / "shutter.txt").write_text(LISTED)
+    np.testing.assert_allclose(load_bracket(tmp_path).times, TIMES)
+    assert_same(load_bracket(zipped_tree(tmp_path, tmp_path / "set.zip")), load_bracket(tmp_path))
+
+
 # ------------------------------------------------------------------------------------ photographs
 
 
@@ -263,6 +359,36 @@ def test_a_bracket_refuses_times_that_are_not_positive_and_ascending(small_brack
 def test_a_bracket_refuses_unequal_counts(small_bracket):
     with pytest.raises(BracketError, match="2 images, 3 times and 2 names"):
         Bracket(small_bracket.images[:2], (1, 2, 3), ("a", "b"))
+
+
+@pytest.mark.parametrize("bits", [10, 12, 14])
+def test_16_bit_files_that_hold_fewer_bits_are_spread_over_all_16_and_it_is_said(save, small_bracket, bits):
+    folder = save(NAMES, {"t.txt": LISTED})
+    images = [image.astype(np.uint16) << (bits - 8) for image in small_bracket.images]
+    for name, image in zip(NAMES, images, strict=False):
+        cv2.imwrite(str(folder / name), image[..., ::-1])
+    bracket = load_bracket(folder)
+    assert f"{bits} bits" in bracket.notes[0]
+    assert np.array_equal(bracket.images[3], images[3] << (16 - bits))
+
+
+def test_a_bracket_keeps_its_times_whatever_happens_to_the_array_they_came_from(small_bracket):
+    times = np.array([1.0, 2.0])
+    bracket = Bracket(small_bracket.images[:2], times, ("a", "b"))
+    times[0] = 99
+    assert bracket.times.tolist() == [1, 2]
+    with pytest.raises(ValueError, match="read-only"):
+        bracket.times[0] = 99
+
+
+@pytest.mark.parametrize("change", [np.float32, lambda image: image[..., 0]], ids=["floats", "grey"])
+def test_a_bracket_refuses_images_of_another_kind(small_bracket, change):
+    with pytest.raises(BracketError, match="uint8 or uint16"):
+        Bracket([change(image) for image in small_bracket.images[:2]], (1, 2), ("a", "b"))
+
+
+def test_what_is_no_path_is_refused():
+    refused(None, "None", "folder or zip")
 
 
 # ---------------------------------------------------------------------------------- real cameras

@@ -13,7 +13,7 @@ from hdr_helpers.align import Alignment, align_mtb, crop_bracket, shift_image
 from hdr_helpers.crf import recover_crf, sample_pixels
 from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, handheld_chapel, scene, sensitivity
 from hdr_helpers.lab.metrics import radiance_error
-from hdr_helpers.load import Bracket, load_bracket
+from hdr_helpers.load import Bracket, BracketError, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec
 from hdr_helpers.tonemap import luminance
 
@@ -88,12 +88,38 @@ def test_most_black_and_white_borders_can_be_told_from_night_and_sun(colour, tol
     assert {j for j in range(len(FRAMES)) if against_light(j, colour) >= 0.6} == told
 
 
-def test_the_note_says_how_many_photographs_have_borders_and_how_much_they_cover(tmp_path):
+def test_a_lamp_that_clips_at_the_edge_of_every_exposure_is_no_border(tmp_path):
+    bracket = handheld_chapel()
+    dark = np.ones(bracket.images[0].shape[:2], dtype=bool)
+    dark[:, :60] = False
+    images = filled(bracket.images, [dark] * len(bracket), BLUE)
+    assert load_bracket(write(tmp_path / "set", images, bracket.times)).valid is None
+
+
+def test_swapped_times_are_doubted_and_make_no_borders(tmp_path, chapel):
+    times = chapel.times.copy()
+    times[[6, 7]] = times[[7, 6]]
+    bracket = load_bracket(write(tmp_path / "set", chapel.images, times))
+    assert bracket.valid is None
+    assert [note.split(":")[0] for note in bracket.notes] == ["a_7.png", "a_6.png"]
+
+
+def test_photographs_without_a_common_part_are_refused(tmp_path, chapel):
+    folder = write(tmp_path / "set", chapel.images[:3], chapel.times[:3])
+    for i, image in enumerate(chapel.images[:3]):
+        alpha = np.zeros(image.shape[:2], np.uint8)
+        alpha[:, 250 * i : 250 * i + 250] = 255
+        cv2.imwrite(str(folder / f"a_{i}.png"), np.dstack([image[..., ::-1], alpha]))
+    with pytest.raises(BracketError, match=r"a_0\.png among them"):
+        load_bracket(folder)
+
+
+def test_the_note_names_photographs_with_borders_and_says_how_much_they_cover(tmp_path):
     images, valid, times = aligned()
     bracket = load_bracket(write(tmp_path / "set", filled(images, valid, BLUE), times))
     (note,) = bracket.notes
     share = 1 - np.logical_and.reduce(bracket.valid).mean()
-    assert note.startswith("6 of 6 photographs have borders that are no photograph")
+    assert note.startswith("a_0.png, a_1.png, a_2.png and 3 more: an edge of one colour")
     assert f"{share:.1%}" in note
     assert share == pytest.approx(1 - np.logical_and.reduce(valid).mean(), abs=0.01)
 
@@ -139,7 +165,7 @@ def test_the_blue_borders_of_the_memorial_are_found_and_noted(real):
     bracket = memorial(real("memorial"))
     union = ~np.logical_and.reduce(bracket.valid)
     assert union.mean() == pytest.approx(0.079, abs=0.003)
-    assert any("borders" in note and f"{union.mean():.1%} of the frame" in note for note in bracket.notes)
+    assert any("an edge of one colour" in note and f"{union.mean():.1%} of the frame" in note for note in bracket.notes)
 
 
 def test_nothing_but_the_blue_borders_of_the_memorial_is_left_out(real):
@@ -402,7 +428,7 @@ def test_the_command_line_runs_on_photographs_with_borders(tmp_path, bordered, c
     images = filled(bracket.images, [border((120, 160), shift) for shift in SHIFTS], (0, 0, white))
     folder = write(tmp_path / "set", images, bracket.times)
     assert main([str(folder), "-o", str(tmp_path / "out"), *["--no-align"] * (not align)]) == 0
-    assert "5 of 5 photographs have borders" in capsys.readouterr().out
+    assert "a_2.png and 2 more: an edge of one colour" in capsys.readouterr().out
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
     read = cv2.imread(str(tmp_path / "out" / "radiance.hdr"), cv2.IMREAD_UNCHANGED)[..., ::-1]
     if not align:

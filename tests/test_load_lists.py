@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from hdr_helpers._reading.lists import name_values, text_values, whole_number_names
+from hdr_helpers._reading.lists import text_values
+from hdr_helpers._reading.names import name_values, whole_number_names
 from hdr_helpers.load import BracketError, load_bracket
 
 REAL = Path(__file__).parents[2] / "shared" / "exposure_files"
@@ -508,7 +509,7 @@ def test_a_list_that_the_photographs_contradict_gives_way_to_the_names_and_is_no
     bracket = load_bracket(shoot(truth, {"t.txt": "0.01 0.04 0.5 0.64 2.56"}))
     assert bracket.source == "the file names"
     np.testing.assert_allclose(bracket.times, list(truth.values()))
-    assert "Set aside" in bracket.notes[0] and "yard_0.16.png: 0.5 s by the text file t.txt" in bracket.notes[0]
+    assert "Not used" in bracket.notes[0] and "yard_0.16.png: 0.5 s by the text file t.txt" in bracket.notes[0]
     assert "yard_0.16.png: 0.16 s by the file names, 0.5 s by the text file t.txt." in bracket.notes
 
 

@@ -2,7 +2,8 @@
 
 files     a folder or zip      ->  the photographs and text files in it, as bytes
 pictures  bytes                ->  an upright RGB picture, where it is opaque, and its EXIF
-lists     text, file names     ->  the numbers written there for each photograph
+lists     a text file          ->  the numbers written there for each photograph
+names     file names           ->  the same
 times     all of these         ->  exposure times, where each came from, notes on what was decided
 evidence  pixels and times     ->  which times the photographs contradict
 borders   pixels               ->  which pixels are no photograph: borders left by an alignment

@@ -16,62 +16,80 @@ CONTRADICTION = 24  # pixel values by which another exposure must contradict a b
 MIN_SHARE = 0.002  # of the frame's pixels; less is not worth a mask
 MAX_SHARE = 0.5  # what covers more is no border
 ENOUGH = 10_000  # pixels of a border that are looked at
+DARK, BRIGHT = 8, 240  # a channel that may be clipped, or as good as
 COLOURFUL = 64  # between the channels of a colour that no grey, black or white comes near
 SUSPICION = 0.1  # of the edge's pixels of one colour that light must fail to explain, to look any further
 MAJORITY = 0.5  # of a border's pixels that light must fail to explain
 
 
-def find_borders(images, opaque) -> list[np.ndarray | None]:
+def find_borders(images, opaque, doubted: bool = False) -> list[np.ndarray | None]:
     """For each photograph where it is a photograph, (H, W) bool, or None where it is one everywhere.
 
     images : P arrays (H, W, 3) uint8, shortest exposure first, roughly on each other
     opaque : P arrays (H, W) bool, or None, outside of which a photograph is no evidence against another
+    doubted : whether the order of the images is in doubt; then they are no evidence against each other
     """
-    edges, pixels = [_edge(image) for image in images], [image.reshape(-1, 3) for image in images]
-    colours = [_common_colours(edge) for edge in edges]
-    count = Counter(colour for some in colours for colour in some)
-    # One colour at the edge of most exposures, though exposures differ: no light does that. First these, so that
-    # they do not count as evidence when the others are judged.
-    repeated = {
-        colour for colour, times in count.items() if times > len(images) / 2 and _neither_dark_nor_bright(colour)
-    }
-    valid = [
-        np.ones(image.shape[:2], dtype=bool) if o is None else o.copy() for image, o in zip(images, opaque, strict=True)
-    ]
-    for image, some, inside in zip(images, colours, valid, strict=True):
-        for colour in repeated.intersection(some):
-            for region in _regions_at_edge(image, colour, 0):
-                inside[_grown(image, colour, region)] = False
-
-    edge_counts, counts = [_edge(v) for v in valid], [v.ravel().copy() for v in valid]
-    for j, (image, inside) in enumerate(zip(images, valid, strict=True)):
-        for colour in colours[j]:
-            there = np.flatnonzero(np.abs(edges[j].astype(np.int16) - colour).max(axis=1) <= TOLERANCE)
-            if colour in repeated or _impossible(edges, edge_counts, j, there) < SUSPICION:
-                continue
-            for region in _regions_at_edge(image, colour, MIN_SHARE):
-                points = np.flatnonzero(region)
-                if _impossible(pixels, counts, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
-                    inside[_grown(image, colour, region)] = False
+    valid = [np.ones(i.shape[:2], dtype=bool) if o is None else o.copy() for i, o in zip(images, opaque, strict=True)]
+    colours = [_common_colours(_edge(image)) for image in images]
+    repeated = _repeated(colours)
+    for colour in repeated:
+        borders = []
+        for image, some in zip(images, colours, strict=True):
+            borders.append(np.zeros(image.shape[:2], dtype=bool))
+            for region in _regions_at_edge(image, colour, 0) if colour in some else ():
+                borders[-1] |= _grown(image, colour, region)
+        # A lamp that clips stays where it is; a border moves with its photograph.
+        fixed = np.logical_and.reduce([b for b in borders if b.any()] or borders)
+        if _clipped(colour) and fixed.sum() > MAJORITY * np.logical_or.reduce(borders).sum():
+            continue
+        for inside, border in zip(valid, borders, strict=True):
+            inside &= ~border
+    if not doubted:
+        _judge_by_light(images, colours, repeated, valid)
     return [None if inside.all() else inside for inside in valid]
 
 
-def _neither_dark_nor_bright(colour) -> bool:
-    """Whether a colour can't be night or sun: strongly coloured, or grey between black and white."""
-    return np.ptp(colour) > COLOURFUL or (min(colour) > 8 and max(colour) < 240)
+def _repeated(colours) -> set[tuple[int, int, int]]:
+    """Colours at the edge of most exposures, though exposures differ: no light does that, unless it clips."""
+    count = Counter(colour for some in colours for colour in some)
+    return {
+        colour
+        for colour, photographs in count.items()
+        if photographs > len(colours) / 2 and (np.ptp(colour) > COLOURFUL or not _clipped(colour))
+    }
 
 
-def _impossible(pixels, counts, j: int, points) -> float:
+def _clipped(colour) -> bool:
+    """Whether every channel is as good as black or white."""
+    return all(value <= DARK or value >= BRIGHT for value in colour)
+
+
+def _judge_by_light(images, colours, repeated, valid) -> None:
+    """Take from valid, P arrays (H, W) bool, the borders that are too dark or too bright for their exposure."""
+    edges, pixels = [_edge(image) for image in images], [image.reshape(-1, 3) for image in images]
+    solid_edges, solid = [_edge(inside) for inside in valid], [inside.ravel().copy() for inside in valid]
+    for j, (image, inside) in enumerate(zip(images, valid, strict=True)):
+        for colour in colours[j]:
+            there = np.flatnonzero(np.abs(edges[j].astype(np.int16) - colour).max(axis=1) <= TOLERANCE)
+            if colour in repeated or _impossible(edges, solid_edges, j, there) < SUSPICION:
+                continue
+            for region in _regions_at_edge(image, colour, MIN_SHARE):
+                points = np.flatnonzero(region)
+                if _impossible(pixels, solid, j, points[:: len(points) // ENOUGH + 1]) > MAJORITY:
+                    inside[_grown(image, colour, region)] = False
+
+
+def _impossible(pixels, solid, j: int, points) -> float:
     """Share of points in photograph j that are darker than in a shorter exposure, or brighter than in a longer one.
 
     pixels : P arrays (n, 3) uint8, shortest exposure first; points : indices into n
-    counts : P arrays (n,) bool, which pixels are evidence
+    solid : P arrays (n,) bool, which pixels are evidence
     """
     here = pixels[j][points].astype(np.int16)
     against = np.zeros(len(points), dtype=bool)
-    for k, (other, solid) in enumerate(zip(pixels, counts, strict=True)):
+    for k, (other, counts) in enumerate(zip(pixels, solid, strict=True)):
         excess = ((other[points] - here) * np.sign(j - k)).max(axis=1)
-        against |= (excess > CONTRADICTION) & solid[points]
+        against |= (excess > CONTRADICTION) & counts[points]
     return float(against.mean())
 
 

@@ -2,9 +2,9 @@
 
 The same light falls on the sensor in every exposure, so the pixel value that u in one photograph becomes
 in the next, T(u), obeys g(T(u)) - g(u) = ln of the ratio of their times, with one response g for all
-pairs. T follows from the two histograms alone (Grossberg and Nayar, What can be known about the
-radiometric response from images, ECCV 2002), so the photographs need not be aligned. A smooth g is fitted
-by least absolute deviations, so a photograph whose time is wrong stands out and does not bend it.
+pairs. T follows from the two histograms alone (papers/grossberg_nayar2003.py), so the photographs need not
+be aligned. A smooth g is fitted by least absolute deviations, so a photograph whose time is wrong stands out
+and does not bend it.
 """
 
 import itertools
@@ -12,34 +12,48 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hdr_helpers.papers.grossberg_nayar2003 import intensity_mapping
+
 DARKEST, BRIGHTEST = 24, 240  # pixel values between which a photograph can be trusted
 MIN_LEVELS, MIN_PIXELS = 6, 300  # what a pair must have in common to be measured
 LIMIT = 0.7  # stops; response, noise and a moved camera leave up to half a stop in real sets
 TYPICAL = np.array([1.2, 1.4, 1.0, 0.0])  # on _basis: near the middle of the cameras that were measured
+MAX_SCALE = 3  # a common power on all times is part of any response; beyond this no camera has it
 PRIOR = 0.5  # weight of the typical response, in pairs; decides only where pairs are few
 
 
 class Evidence(NamedTuple):
     """What neighbouring photographs, shortest exposure first, show beside what their times claim.
 
-    claimed : (P-1,) ln of the ratio of the times; seen : (P-1,) the same from the pixels, NaN where too
-    few pixels are well exposed in both
+    claimed : (P-1,) ln of the ratio of the times
+    seen : (P-1,) the same from the pixels, NaN where too few are well exposed in both
+    typical : (P-1,) the same if the response were TYPICAL; it owes nothing to the times
     """
 
     claimed: np.ndarray
     seen: np.ndarray
+    typical: np.ndarray
+
+    @property
+    def stops(self) -> np.ndarray:
+        """(P-1,) float64, stops by which the pixels' ratio exceeds the claimed one; 0 where it was not measured."""
+        return np.nan_to_num((self.seen - self.claimed) / np.log(2))
 
     @property
     def excess(self) -> np.ndarray:
-        """(P-1,) float64, stops by which the pixels' ratio exceeds the claimed one; 0 where that may be chance."""
-        seen, claimed = (np.nan_to_num(x) / np.log(2) for x in (self.seen, self.claimed))
-        stops = np.where(np.isnan(self.seen), 0.0, seen - claimed)
-        # Where T(u) = u the photographs are exposed alike, whatever the response.
-        alike = ~np.isnan(self.seen) & (seen < 0.1) & (claimed > 0.5)
-        strong = (np.abs(stops) > LIMIT) | alike
+        """(P-1,) float64, the same, but 0 where it may be chance."""
+        seen, claimed, size = self.seen / np.log(2), self.claimed / np.log(2), np.abs(self.stops)
+        # Where T(u) = u the photographs are exposed alike, whatever the response. (NaN compares as False.)
+        strong = (size > LIMIT) | ((seen < 0.1) & (claimed > 0.5))
         # A wrong time shows on both sides of its photograph; beside a strong sign a weaker one counts too.
         beside = np.append(strong[1:], False) | np.append(False, strong[:-1])
-        return np.where(strong | (beside & (np.abs(stops) > LIMIT / 2)), stops, 0.0)
+        return np.where(strong | (beside & (size > LIMIT / 2)), self.stops, 0.0)
+
+    @property
+    def scale(self) -> float:
+        """How many times more stops a typical camera would need for these photographs than the times claim."""
+        ratio = self.typical / self.claimed
+        return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 1.0
 
 
 def measure(histograms, times) -> Evidence:
@@ -47,15 +61,15 @@ def measure(histograms, times) -> Evidence:
 
     histograms : (P, 256) counts of pixel values, shortest exposure first; times : (P,) seconds, ascending
     """
-    claimed = np.diff(np.log(times))
     pairs = [transfer(a, b) for a, b in itertools.pairwise(histograms)]
     steps = [_basis(there) - _basis(here) for here, there in pairs]
     known = [j for j, step in enumerate(steps) if len(step)]
-    seen = np.full(len(claimed), np.nan)
+    seen, typical = np.full((2, len(steps)), np.nan)
     if known:
         response = _fit_response(steps, known, np.log(times))
         seen[known] = [np.median(steps[j] @ response) for j in known]
-    return Evidence(claimed, seen)
+        typical[known] = [np.median(steps[j] @ TYPICAL) for j in known]
+    return Evidence(np.diff(np.log(times)), seen, typical)
 
 
 def _fit_response(steps, known, log_times) -> np.ndarray:
@@ -88,21 +102,12 @@ def _fit_response(steps, known, log_times) -> np.ndarray:
     return x[:size]
 
 
-def looks_brighter(first, second) -> float:
-    """How many times as bright a second photograph looks, for a typical response; NaN where that can't be told.
+def transfer(first, second) -> tuple[np.ndarray, np.ndarray]:
+    """Well-exposed pixel values of one photograph and what they became in the next; empty where there are too few.
 
     first, second : (256,) counts of pixel values
     """
-    here, there = transfer(first, second)
-    return float(np.exp(np.median((_basis(there) - _basis(here)) @ TYPICAL))) if len(here) else float("nan")
-
-
-def transfer(first, second) -> tuple[np.ndarray, np.ndarray]:
-    """Pixel values of one photograph and, by matching histograms, what they became in the next."""
-    below_first, below_second = (np.cumsum(h) - h / 2 for h in (first, second))
-    here = np.arange(256.0)
-    filled = np.flatnonzero(second)
-    there = np.interp(below_first, below_second[filled], filled)
+    here, there = np.arange(256.0), intensity_mapping(first, second)
     both = (first > 0) & (np.minimum(here, there) > DARKEST) & (np.maximum(here, there) < BRIGHTEST)
     if both.sum() < MIN_LEVELS or first[both].sum() < MIN_PIXELS:
         return np.empty(0), np.empty(0)
@@ -122,10 +127,15 @@ def doubts(evidence: Evidence, times, names, source: str) -> list[str]:
     """
     excess = evidence.excess
     if not excess.any():
-        return []
+        if 1 / MAX_SCALE < evidence.scale < MAX_SCALE:
+            return []
+        stops = np.log2(times[-1] / times[0])
+        return [
+            f"By {source} the times span {stops:.2g} stops, but the photographs look about "
+            f"{stops * evidence.scale:.2g} stops apart; check that these are exposure times."
+        ]
     # One wrong time shows in two pairs, too long in one and too short in the other. Where it can be told
     # which photograph is off, most others agree with one another; pairs that were not measured cut the chain.
-    measured = np.nan_to_num(evidence.seen - evidence.claimed) / np.log(2)
     sentences = []
     cuts = np.flatnonzero(np.isnan(evidence.seen)) + 1
     for chain in np.split(np.arange(len(times)), cuts):
@@ -134,7 +144,7 @@ def doubts(evidence: Evidence, times, names, source: str) -> list[str]:
         off -= usual
         wrong = np.zeros(len(chain), dtype=bool)
         for i in np.argsort(-np.abs(off)):  # no more photographs than it takes to explain every pair
-            unexplained = measured[chain[:-1]] - np.diff(np.where(wrong, off, 0))
+            unexplained = evidence.stops[chain[:-1]] - np.diff(np.where(wrong, off, 0))
             if np.abs(off[i]) > LIMIT / 2 and np.any(np.abs(unexplained) > LIMIT):
                 wrong[i] = True
         if 0 < 3 * wrong.sum() < len(chain):

@@ -20,7 +20,8 @@ MAX_DEPTH = 3  # folders inside folders: unpacking a zip often leaves one or two
 def bracket_files(path: Path) -> dict[str, Callable[[], bytes]]:
     """From each file name in the bracket's folder to a function that reads the file.
 
-    path : folder or zip; where it holds no photographs itself, the one folder inside that does is taken
+    path : folder or zip; where it holds no photographs itself, the one folder inside that does is taken, with the
+        text files on the way to it
     Raises BracketError where there is no such place, more than one, or a zip that can't be unpacked.
     """
     if os.path.isdir(path):  # unlike Path.is_dir it has an answer for a name that is too long
@@ -29,9 +30,14 @@ def bracket_files(path: Path) -> dict[str, Callable[[], bytes]]:
         files = _zip_files(path)
     else:
         state = "is neither a folder nor a zip" if os.path.exists(path) else "does not exist"
+        if path.suffix.lower() == ".zip" and os.path.isfile(path):
+            state = "is cut short, or no zip"
         raise BracketError(f"{path} {state}; give the folder or zip that holds the photographs.")
     home = _home(files, path)
-    return {f.name: read for f, read in files.items() if f.parent == home}
+    # The list may lie above a folder of photographs; the nearest counts.
+    texts = [f for f in files if f.parent in home.parents and not is_photograph(f.name)]
+    inside = sorted(texts, key=lambda f: len(f.parts)) + [f for f in files if f.parent == home]
+    return {f.name: files[f] for f in inside}
 
 
 def natural(name: str) -> list:
@@ -70,7 +76,7 @@ def _folder_files(path: Path) -> dict[PurePosixPath, Callable[[], bytes]]:
         level = path.glob("/".join(["*"] * (depth + 1)))
         files = {PurePosixPath(p.relative_to(path).as_posix()): p for p in level if p.is_file()}
         found |= {name: _reader(p) for name, p in files.items() if not _hidden(name)}
-        if any(is_photograph(f.name) for f in found):
+        if max(Counter(f.parent for f in found if is_photograph(f.name)).values(), default=0) > 1:
             break  # do not wander through the rest of someone's disk
     return found
 

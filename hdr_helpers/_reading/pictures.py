@@ -100,11 +100,13 @@ def _opaque(data: bytes, exif: Exif) -> np.ndarray | None:
     """Where a picture with an alpha channel isn't transparent: programs that align leave such borders."""
     if data[:4] not in TIFF_MARKS and not (data[:4] == PNG_MARK and data[25:26] in (b"\4", b"\6")):
         return None
-    raw = _decode(data, cv2.IMREAD_UNCHANGED)[0]  # only this flag keeps alpha, and it ignores orientation
+    raw = _decode(data, cv2.IMREAD_UNCHANGED)[0]
     if raw is None or raw.ndim != 3 or raw.shape[2] != 4 or raw[..., 3].all() or not raw[..., 3].any():
         return None
     opaque = raw[..., 3] > 0
-    return TURNS[exif.orientation](opaque) if exif.orientation in TURNS else opaque
+    # Only this flag keeps alpha; with it OpenCV turns a TIFF as its orientation says, and a PNG not.
+    turn = TURNS.get(exif.orientation) if data[:4] == PNG_MARK else None
+    return turn(opaque) if turn else opaque
 
 
 def read_exif(block: bytes) -> Exif:

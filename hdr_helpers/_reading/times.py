@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hdr_helpers._reading import BracketError
-from hdr_helpers._reading.evidence import doubts, looks_brighter, measure
-from hdr_helpers._reading.lists import EV, OPEN, SECONDS, Listed, name_values, text_values, whole_number_names
+from hdr_helpers._reading.evidence import doubts, measure
+from hdr_helpers._reading.lists import EV, OPEN, SECONDS, Listed, text_values
+from hdr_helpers._reading.names import name_values, whole_number_names
 from hdr_helpers._reading.pictures import Exif
 
 ROUNDING = 0.05  # cameras print rounded times; two sources that differ by more are both reported
@@ -22,12 +23,14 @@ EV_STEP, EV_REACH = 0.25, 24  # EV lists have no finer steps, and no camera reac
 
 
 class Times(NamedTuple):
-    """seconds : (P,) float64; places : where each is written; source : for people; notes : sentences"""
+    """seconds : (P,) float64; places : where each is written; source : for people; notes : sentences;
+    doubted : whether the photographs contradict some of them"""
 
     seconds: np.ndarray
     places: tuple[str, ...]
     source: str
     notes: list[str]
+    doubted: bool = False
 
 
 class _Candidate(NamedTuple):
@@ -54,18 +57,19 @@ def find_times(path, names, texts, exif: list[Exif], histograms) -> Times:
             misfits.append(misfit)
     if not candidates and (listed := whole_number_names(names)):
         candidate = _judge("the file names", listed, camera, names, histograms)
-        candidates += [candidate] * (not candidate.doubts)
+        if not candidate.doubts:
+            candidates.append(candidate)
     if not candidates:
-        raise misfits[0] if misfits else _nothing(path, names, texts)
+        raise misfits[0] if misfits else _nothing(path, names, texts, camera)
 
     first = int(np.argmin([len(c.doubts) for c in candidates]))  # of those with the fewest
     chosen = candidates.pop(first)
-    notes = [*chosen.times.notes, *chosen.doubts, *map(str, misfits)]
+    notes = [*chosen.times.notes, *chosen.doubts, *(f"Not used: {misfit}" for misfit in misfits)]
     for trusted in candidates[:first]:
-        notes.append(f"Set aside: {trusted.times.source}. {' '.join(trusted.doubts)}")
+        notes.append(f"Not used: {trusted.times.source}. {' '.join(trusted.doubts)}")
     for other in candidates:
         notes += _differences(names, chosen.times, other.times)
-    return chosen.times._replace(notes=notes)
+    return chosen.times._replace(notes=notes, doubted=bool(chosen.doubts))
 
 
 def _sources(texts, names, camera) -> tuple[list[tuple[str, Listed]], list[BracketError]]:
@@ -84,7 +88,12 @@ def _sources(texts, names, camera) -> tuple[list[tuple[str, Listed]], list[Brack
     return lists + [(source, listed) for source, listed in others if listed], misfits
 
 
-def _nothing(path, names, texts) -> BracketError:
+def _nothing(path, names, texts, camera) -> BracketError:
+    if 0 < len(camera.missing) < len(names):
+        return BracketError(
+            f"EXIF has no exposure time for {camera.missing[0]} ({len(camera.missing)} of {len(names)} photographs); "
+            "take it out of the folder, or list the times of all in a text file there."
+        )
     some = ", ".join([*texts][:3]) + (f" and {len(texts) - 3} more" if len(texts) > 3 else "")
     looked = f" No line for each of the {len(names)} photographs stands in {some}." if texts else ""
     return BracketError(
@@ -97,13 +106,15 @@ class _Camera:
     """What EXIF says: times, and the gain by which ISO and aperture change the exposure.
 
     listed : the times, as a source, where all photographs have one, else None
+    missing : names of the photographs that have none
     gains : (P,) float64, ISO / N^2 relative to its smallest, or None where neither changes
     note : the sentence that says so
     """
 
     def __init__(self, names, exif):
         seconds = tuple(e.seconds for e in exif)
-        self.listed = Listed(seconds, tuple(f"EXIF of {n}" for n in names), SECONDS) if all(seconds) else None
+        self.missing = [name for name, time in zip(names, seconds, strict=True) if not time]
+        self.listed = None if self.missing else Listed(seconds, tuple(f"EXIF of {n}" for n in names), SECONDS)
         gains, changes = np.ones(len(names)), []
         for what, values in (("ISO", [e.iso for e in exif]), ("the aperture", [e.f_number for e in exif])):
             if all(values) and max(values) > min(values) * (1 + ROUNDING):
@@ -112,7 +123,7 @@ class _Camera:
                 changes.append(f"{what} changes from {mark}{min(values):g} to {mark}{max(values):g}")
         self.gains = gains / gains.min() if changes else None
         self.note = (
-            f"{_capital(' and '.join(changes))}; each time is multiplied by ISO / N^2, "
+            f"EXIF says that {' and '.join(changes)}; each time is multiplied by ISO / N^2, "
             "relative to the least sensitive photograph, and stands for the exposure."
         )
 
@@ -129,12 +140,12 @@ def _judge(source, listed, camera, names, histograms) -> _Candidate:
 
     Raises BracketError where it can't be true.
     """
-    brightness = histograms @ np.arange(256) / histograms.sum(axis=1)
+    brightness = histograms @ np.arange(256) / np.maximum(histograms.sum(axis=1), 1)
     values, notes = _exposures(source, listed, camera, names, brightness)
     order = np.argsort(values, kind="stable")
     named, histograms = [names[i] for i in order], histograms[order]
     for i in np.flatnonzero(np.diff(values[order]) == 0):
-        ratio = looks_brighter(histograms[i], histograms[i + 1])
+        ratio = np.exp(measure(histograms[i : i + 2], (1.0, 2.0)).typical[0])
         looks = "they look alike" if 0.9 < ratio < 1.1 else "they are not equally bright"
         raise BracketError(
             f"{named[i]} and {named[i + 1]} have the same exposure time, {values[order[i]]:.4g} s, by {source}"
@@ -152,7 +163,14 @@ def _judge(source, listed, camera, names, histograms) -> _Candidate:
 def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, list[str]]:
     """Seconds, with ISO and aperture in them where those change, from what is written; and notes on what it was."""
     values, notes = np.array(listed.values, dtype=np.float64), []
-    as_stops = listed.kind == EV or (listed.kind == OPEN and _may_be_stops(values, brightness))
+    plausible = listed.kind == OPEN and _may_be_stops(values)
+    as_stops = listed.kind == EV or (plausible and _agreement(values, brightness) >= MIN_AGREEMENT)
+    if not as_stops and plausible and values.min() < 0:
+        given = ", ".join(f"{name} {value:g}" for name, value in zip(names, values, strict=True))
+        raise BracketError(
+            f"The EV steps of {source} do not fit the brightness of the photographs: {given}; write each step "
+            f"beside the name of its photograph, as in: {names[0]} {values[0]:g}"
+        )
     if not as_stops and values.min() <= 0:
         i = int(np.argmin(values))
         raise BracketError(f"{names[i]}: {values[i]:g} s by {source}; a time must be positive, as in: {names[i]} 1/60")
@@ -176,23 +194,18 @@ def _exposures(source, listed, camera, names, brightness) -> tuple[np.ndarray, l
     return values * gains, notes
 
 
-def _capital(sentence: str) -> str:
-    return sentence[:1].upper() + sentence[1:]
-
-
 def _agreement(values, brightness) -> float:
-    """1 where the larger value is the brighter photograph for every pair, -1 where for none; a tie does no harm."""
+    """1 where the larger value is the brighter photograph for every pair, -1 where for none; ties do not count."""
     i, j = np.triu_indices(len(values), 1)
     brighter = brightness[j] - brightness[i]
-    agrees = np.where(np.abs(brighter) < TIE, 1, np.sign(values[j] - values[i]) * np.sign(brighter))
-    return float(agrees.mean())
+    told = np.abs(brighter) >= TIE
+    return float(np.sign((values[j] - values[i]) * brighter)[told].mean()) if told.any() else 1.0
 
 
-def _may_be_stops(values, brightness) -> bool:
+def _may_be_stops(values) -> bool:
     """Whether numbers, some of them not positive, are EV steps and not times with a slip of the pen."""
     steps = np.diff(np.sort(values))
-    plausible = values.min() <= 0 and np.abs(values).max() <= EV_REACH and steps.min() >= EV_STEP
-    return plausible and _agreement(values, brightness) >= MIN_AGREEMENT
+    return values.min() <= 0 and np.abs(values).max() <= EV_REACH and steps.min() >= EV_STEP
 
 
 def _same(a, b) -> bool:
