@@ -105,8 +105,8 @@ def test_swapped_times_are_doubted_and_make_no_borders(tmp_path, chapel):
 
 
 def test_photographs_without_a_common_part_are_refused(tmp_path, chapel):
-    folder = write(tmp_path / "set", chapel.images[:3], chapel.times[:3])
-    for i, image in enumerate(chapel.images[:3]):
+    folder = write(tmp_path / "set", chapel.images[::4], chapel.times[::4])
+    for i, image in enumerate(chapel.images[::4]):
         alpha = np.zeros(image.shape[:2], np.uint8)
         alpha[:, 250 * i : 250 * i + 250] = 255
         cv2.imwrite(str(folder / f"a_{i}.png"), np.dstack([image[..., ::-1], alpha]))

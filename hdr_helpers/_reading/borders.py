@@ -13,7 +13,7 @@ import numpy as np
 TOLERANCE = 3  # pixel values by which JPEG changes a flat colour
 RINGING, REACH = 16, 4  # pixel values by which it changes one near its end, and how many pixels from there
 CONTRADICTION = 24  # pixel values by which another exposure must contradict a border
-MIN_SHARE = 0.002  # of the frame's pixels; less is not worth a mask
+MIN_SHARE = 0.01  # of the frame; a smaller bright or dark spot at the edge may only have been moved by the hand
 MAX_SHARE = 0.5  # what covers more is no border
 ENOUGH = 10_000  # pixels of a border that are looked at
 DARK, BRIGHT = 8, 240  # a channel that may be clipped, or as good as
