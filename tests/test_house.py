@@ -37,6 +37,14 @@ def test_a_stage_imports_only_numbers_and_earlier_stages(stage):
             assert module.split(".")[0] not in {"matplotlib", "IPython", "ipywidgets", "nbgrader"}
 
 
+def test_a_room_behind_loading_imports_only_other_rooms_and_papers():
+    rooms = list((ROOT / "hdr_helpers" / "_reading").glob("*.py"))
+    assert rooms
+    for room in rooms:
+        ours = [module for module in imports(room) if module.startswith("hdr_helpers")]
+        assert all(module.startswith(("hdr_helpers._reading", "hdr_helpers.papers")) for module in ours), room.name
+
+
 def test_a_paper_imports_no_stage():
     papers = list((ROOT / "hdr_helpers" / "papers").glob("*.py"))
     assert papers
