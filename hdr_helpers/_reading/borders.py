@@ -67,7 +67,7 @@ def _clipped(colour) -> bool:
 def _judge_by_light(images, colours, repeated, valid) -> None:
     """Take from valid, P arrays (H, W) bool, the borders that are too dark or too bright for their exposure."""
     edges, pixels = [_edge(image) for image in images], [image.reshape(-1, 3) for image in images]
-    solid_edges, solid = [_edge(inside) for inside in valid], [inside.ravel().copy() for inside in valid]
+    solid_edges, solid = [_edge(inside) for inside in valid], [inside.ravel() for inside in valid]
     for j, (image, inside) in enumerate(zip(images, valid, strict=True)):
         for colour in colours[j]:
             there = np.flatnonzero(np.abs(edges[j].astype(np.int16) - colour).max(axis=1) <= TOLERANCE)

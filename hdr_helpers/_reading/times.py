@@ -6,6 +6,7 @@ cameras' roundings.) The photographs have the last word: where they contradict a
 out takes its place. They also tell seconds from 1/seconds, because a longer exposure is brighter.
 """
 
+import contextlib
 from typing import NamedTuple
 
 import numpy as np
@@ -56,9 +57,9 @@ def find_times(path, names, texts, exif: list[Exif], histograms) -> Times:
         except BracketError as misfit:
             misfits.append(misfit)
     if not candidates and (listed := whole_number_names(names)):
-        candidate = _judge("the file names", listed, camera, names, histograms)
-        if not candidate.doubts:
-            candidates.append(candidate)
+        with contextlib.suppress(BracketError):  # then they count the photographs
+            candidate = _judge("the file names", listed, camera, names, histograms)
+            candidates += [] if candidate.doubts else [candidate]
     if not candidates:
         raise misfits[0] if misfits else _nothing(path, names, texts, camera)
 
