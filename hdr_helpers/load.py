@@ -104,11 +104,13 @@ def in_8_bits(image) -> np.ndarray:
 def load_bracket(path) -> Bracket:
     """Read every photograph of a folder or zip, with its exposure time.
 
-    path : folder or .zip that holds the photographs (JPEG, PNG, TIFF, BMP or PPM; 8 or 16 bits) and, if the
-        times are neither in the file names nor in EXIF, one text file that lists them
+    path : folder or .zip that holds the photographs (JPEG, PNG, TIFF, BMP or PPM; 8 or 16 bits), and perhaps a
+        text file that lists their times
 
-    Returns a Bracket in ascending time; its notes say what was decided. Where EXIF says that ISO or aperture
-    change, times are exposures: t ISO / N^2.
+    Times come from the text file, the file names or EXIF, in this order of trust; where the photographs contradict
+    one of them and bear out another, from that one. Where EXIF says that ISO or aperture change, times are
+    exposures: t ISO / N^2.
+    Returns a Bracket in ascending time; its notes say what was decided.
     Raises BracketError where the photographs or the times can't be used; nothing is loaded then.
     """
     try:
