@@ -1,13 +1,13 @@
 """Stage 1: exposure times from every source, and a sentence for everything that can't be used."""
 
 import json
-import struct
 import unicodedata
 import zipfile
 
 import cv2
 import numpy as np
 import pytest
+from photographs import exif_block, write_with_exif
 
 from hdr_helpers._reading.pictures import Exif, read_exif
 from hdr_helpers.load import Bracket, BracketError, load_bracket
@@ -18,34 +18,13 @@ KNOWN = dict(zip(NAMES, TIMES, strict=True))
 LISTED = "".join(f"{name} {seconds}\n" for name, seconds in KNOWN.items())
 
 
-def exif_block(numerator, denominator, order, orientation=1):
-    """A TIFF header, Orientation in the first directory, ExposureTime in the Exif directory."""
-    mark = {"<": b"II", ">": b"MM"}[order]
-    first = struct.pack(order + "HHHIHHHHIII", 2, 0x0112, 3, 1, orientation, 0, 0x8769, 4, 1, 38, 0)
-    exif = struct.pack(order + "HHHIII", 1, 0x829A, 5, 1, 56, 0)
-    return mark + struct.pack(order + "HI", 42, 8) + first + exif + struct.pack(order + "II", numerator, denominator)
-
-
-def write_with_exif(path, image, exif):
-    kinds, blocks = [cv2.IMAGE_METADATA_EXIF], [np.frombuffer(exif, np.uint8)]
-    _, data = cv2.imencodeWithMetadata(path.suffix, np.ascontiguousarray(image[..., ::-1]), kinds, blocks)
-    path.write_bytes(data.tobytes())
-
-
 def zipped(folder, target, inside="", also=()):
     with zipfile.ZipFile(target, "w") as archive:
         for name in also:
             archive.writestr(name, b"not a picture")
-        for path in folder.iterdir():
-            archive.write(path, inside + path.name)
-    return target
-
-
-def zipped_tree(folder, target):
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    with zipfile.ZipFile(target, "w") as archive:
-        for path in files:
-            archive.write(path, path.relative_to(folder))
+        for path in sorted(folder.rglob("*")):
+            if path.is_file() and path != target:
+                archive.write(path, inside + path.relative_to(folder).as_posix())
     return target
 
 
@@ -133,23 +112,23 @@ def test_file_names_give_the_times(save, names, times):
 @pytest.mark.parametrize("order", "<>")
 def test_exif_gives_the_times_in_both_byte_orders(tmp_path, small_bracket, order, suffix):
     for i, denominator in enumerate((400, 60, 10)):
-        exif = exif_block(1, denominator, order)
+        exif = exif_block(order, (1, denominator))
         write_with_exif(tmp_path / f"IMG_{i}{suffix}", small_bracket.images[i], exif)
     bracket = load_bracket(tmp_path)
     np.testing.assert_allclose(bracket.times, [1 / 400, 1 / 60, 1 / 10])
     assert "EXIF" in bracket.source
 
 
-@pytest.mark.parametrize("cut", [0, 2, 7, 9, 30, 50, 60])
+@pytest.mark.parametrize("cut", [0, 2, 7, 9, 20, 30, 44, 51])
 def test_exif_cut_short_gives_no_time(cut):
-    block = exif_block(1, 3, "<")
+    block = exif_block("<", (1, 3))
     assert read_exif(block).seconds == 1 / 3
-    assert read_exif(block[:cut])._replace(orientation=None) == Exif()
+    assert read_exif(block[:cut]) == Exif()
 
 
 @pytest.mark.parametrize("fraction", [(0, 1), (1, 0), (0, 0)])
 def test_exif_without_a_positive_time_gives_none(fraction):
-    assert read_exif(exif_block(*fraction, ">")).seconds is None
+    assert read_exif(exif_block(">", fraction)).seconds is None
 
 
 def test_two_sources_that_disagree_are_noted_with_both_values(save):
@@ -230,7 +209,7 @@ def test_1_over_t_is_recognised_though_two_photographs_are_equally_black(save, s
 
 def test_counters_with_a_decimal_point_give_way_to_exif(tmp_path, small_bracket):
     for name, image, denominator in zip(("12.30", "12.31", "12.33"), small_bracket.images, (400, 60, 10), strict=False):
-        write_with_exif(tmp_path / f"Shot {name}.png", image, exif_block(1, denominator, "<"))
+        write_with_exif(tmp_path / f"Shot {name}.png", image, exif_block("<", (1, denominator)))
     bracket = load_bracket(tmp_path)
     np.testing.assert_allclose(bracket.times, (1 / 400, 1 / 60, 1 / 10))
     assert any(note.startswith("Not used: the file names") and "stops apart" in note for note in bracket.notes)
@@ -238,7 +217,7 @@ def test_counters_with_a_decimal_point_give_way_to_exif(tmp_path, small_bracket)
 
 def test_one_photograph_without_exif_is_named(tmp_path, small_bracket):
     for i, denominator in enumerate((400, 60, 10)):
-        write_with_exif(tmp_path / f"IMG_{i}.png", small_bracket.images[i], exif_block(1, denominator, "<"))
+        write_with_exif(tmp_path / f"IMG_{i}.png", small_bracket.images[i], exif_block("<", (1, denominator)))
     cv2.imwrite(str(tmp_path / "result.png"), small_bracket.images[2])
     refused(tmp_path, "result.png", "1 of 4", "take it out")
 
@@ -257,7 +236,7 @@ def test_a_list_beside_the_folder_of_photographs_is_read(save, tmp_path):
     save(NAMES, folder="images")
     (tmp_path / "shutter.txt").write_text(LISTED)
     np.testing.assert_allclose(load_bracket(tmp_path).times, TIMES)
-    assert_same(load_bracket(zipped_tree(tmp_path, tmp_path / "set.zip")), load_bracket(tmp_path))
+    assert_same(load_bracket(zipped(tmp_path, tmp_path / "set.zip")), load_bracket(tmp_path))
 
 
 # ------------------------------------------------------------------------------------ photographs
@@ -326,7 +305,7 @@ def test_fractions_and_exif_are_seconds_and_are_never_turned_into_their_inverse(
     folder = tmp_path / "exif"
     folder.mkdir()
     for name, image, fraction in zip(NAMES, small_bracket.images, ((6, 10), (1, 10), (1, 60), (1, 400)), strict=False):
-        write_with_exif(folder / name, image, exif_block(*fraction, "<"))
+        write_with_exif(folder / name, image, exif_block("<", fraction))
     refused(folder, "EXIF", "do not get brighter")
 
 

@@ -6,7 +6,7 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from test_load_evidence import known
+from photographs import known
 
 from hdr_helpers.__main__ import main
 from hdr_helpers.align import Alignment, align_mtb, crop_bracket, shift_image

@@ -3,44 +3,22 @@
 import itertools
 import re
 import shutil
-import struct
 from functools import cache
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 import pytest
+from photographs import exif_block, histograms, known, write_with_exif
 
 from hdr_helpers._reading.pictures import Exif, read_exif
 from hdr_helpers._reading.times import find_times
 from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, handheld_chapel, scene, sensitivity
 from hdr_helpers.lab.data import DATA
-from hdr_helpers.load import in_8_bits, load_bracket
+from hdr_helpers.load import load_bracket
 
 NAMES = tuple(f"a_{i}.png" for i in range(1, 6))
 NEUTRAL = tuple(f"frame_{i:02d}.png" for i in range(16))  # some real names hold times, another source
 REACH = 20  # pixels by which a hand moves a frame
-
-
-class Known(NamedTuple):
-    """What is asked of a bracket again and again: its notes, and what the photographs are judged by."""
-
-    names: tuple[str, ...]
-    times: np.ndarray
-    notes: tuple[str, ...]
-    histograms: np.ndarray
-    valid: tuple[np.ndarray, ...] | None
-
-
-def histograms(images):
-    return np.array([np.bincount(in_8_bits(image)[..., 1].ravel(), minlength=256) for image in images])
-
-
-@cache
-def known(folder):
-    """A bracket on disk is read once, whatever the number of tests."""
-    bracket = load_bracket(folder)
-    return Known(bracket.names, bracket.times, bracket.notes, histograms(bracket.images), bracket.valid)
 
 
 def notes(counts, times, names=None):
@@ -266,26 +244,6 @@ def test_a_wrong_time_of_the_hand_held_chapel_is_found_without_aligning(frame, f
 # ------------------------------------------------------------------------- what the doubts decide
 
 
-def exif_block(order="<", seconds=None, iso=None, f_number=None):
-    """A TIFF header, a pointer, and an Exif directory with ExposureTime, FNumber and ISO, where given.
-
-    seconds, f_number : (numerator, denominator); iso : integer
-    """
-    mark = {"<": b"II", ">": b"MM"}[order]
-    given = [(0x829A, seconds), (0x829D, f_number), (0x8827, iso)]
-    given = [(tag, value) for tag, value in given if value is not None]
-    end = 26 + 2 + 12 * len(given) + 4
-    directory, fractions = struct.pack(order + "H", len(given)), b""
-    for tag, value in given:
-        if isinstance(value, tuple):
-            directory += struct.pack(order + "HHII", tag, 5, 1, end + len(fractions))
-            fractions += struct.pack(order + "II", *value)
-        else:
-            directory += struct.pack(order + "HHIHH", tag, 3, 1, value, 0)
-    first = struct.pack(order + "HHHIII", 1, 0x8769, 4, 1, 26, 0)
-    return mark + struct.pack(order + "HI", 42, 8) + first + directory + bytes(4) + fractions
-
-
 @pytest.fixture
 def write(tmp_path):
     """write(images, blocks, text) writes a folder of PNG files with EXIF; returns it."""
@@ -294,9 +252,7 @@ def write(tmp_path):
         folder = tmp_path / "photographs"
         folder.mkdir()
         for name, image, block in zip(NAMES, images, blocks, strict=False):
-            kinds, data = [cv2.IMAGE_METADATA_EXIF], [np.frombuffer(block, np.uint8)]
-            _, encoded = cv2.imencodeWithMetadata(".png", np.ascontiguousarray(image[..., ::-1]), kinds, data)
-            (folder / name).write_bytes(encoded.tobytes())
+            write_with_exif(folder / name, image, block)
         if text is not None:
             (folder / "t.txt").write_text(text)
         return folder

@@ -157,6 +157,15 @@ ZIPPED = packed(GOOD)
 LZMA = packed(GOOD, zipfile.ZIP_LZMA)
 CHINESE = packed({name.replace("a", "照片"): data for name, data in GOOD.items()})
 
+NO_TIMES = {
+    "zero": "0",
+    "a negative time": "-1/30",
+    "nan": "nan",
+    "infinity": "inf",
+    "1/0": "1/0",
+    "a number beyond all floats": "1e999",
+    "a word": "short",
+}
 REFUSED = {
     # the folder
     "a folder that does not exist": (lambda at: at / "nowhere", ["nowhere", "does not exist"]),
@@ -263,26 +272,11 @@ REFUSED = {
     "a photograph listed with two times": (with_files(t=LISTED + "a_2.png 1/8"), ["t.txt", "a_2.png", "twice"]),
     **{
         f"{what} in a list of names": (with_files(t=LISTED.replace("1/30", value)), ["t.txt", "a_2.png", "1/60"])
-        for what, value in {
-            "zero": "0",
-            "a negative time": "-1/30",
-            "nan": "nan",
-            "infinity": "inf",
-            "1/0": "1/0",
-            "a number beyond all floats": "1e999",
-            "a word": "short",
-        }.items()
+        for what, value in NO_TIMES.items()
     },
     **{
         f"{what} in a list without names": (with_files(t=f"1/60 {value} 1/15"), ["t.txt", "a_", "1/60"])
-        for what, value in {
-            "zero": "0",
-            "a negative time": "-1/30",
-            "nan": "nan",
-            "infinity": "inf",
-            "1/0": "1/0",
-            "a word": "short",
-        }.items()
+        for what, value in NO_TIMES.items()
     },
     "words instead of all times": (with_files(t=re.sub("1/..", "bright", LISTED)), ["t.txt", "1/60"]),
     "equal times": (with_files(t="1/60 1/30 1/30"), ["a_2.png", "a_3.png", "same exposure time", "0.03333 s"]),

@@ -62,3 +62,14 @@ def psnr_mu(radiance, truth, mu: float = 5000.0) -> float:
         return np.log1p(mu * np.tanh(light / white)) / np.log1p(mu)
 
     return float(-10 * np.log10(np.mean((compress(radiance * scale) - compress(truth)) ** 2)))
+
+
+def one_photo_errors(bracket) -> list[tuple[RadianceError, RadianceError]]:
+    """For each photograph the RadianceError of two guesses: by a gamma of 2.2, and by the camera's true curve."""
+    crf, truth = bracket.truth.crf, bracket.truth.radiance
+    errors = []
+    for image in bracket.images:
+        by_gamma = np.maximum(image / np.float32(255), 1 / 512) ** 2.2  # value 0 is not zero light
+        by_curve = np.exp(np.stack([g[image[..., c]] for c, g in enumerate(crf)], axis=-1))
+        errors.append((radiance_error(by_gamma, truth), radiance_error(by_curve, truth)))
+    return errors

@@ -24,7 +24,6 @@ from hdr_helpers.lab.figures.style import (
     plain,
     seconds,
 )
-from hdr_helpers.lab.metrics import radiance_error
 
 CURVES = (("gamma 2.2, a guess", BRIGHT_MARK, ""), ("the camera's true curve", "#009E73", "//"))
 PREVIEW = 800  # pixels across of a single photograph
@@ -164,10 +163,9 @@ def pixel_figure(bracket, points, title="One curve for each pixel, at a differen
     return fig
 
 
-def one_photo_figure(bracket):
-    """What each photograph alone says of the scene, against the truth of a virtual camera."""
+def one_photo_figure(bracket, errors):
+    """What each photograph alone says of the scene; errors as one_photo_errors gives them."""
     labels = [seconds(t) for t in bracket.times]
-    errors = one_photo_errors(bracket)
     fig, (left, right) = new_figure(1, 2, 3.4)
     bars = left.bar(labels, [100 * usable_share(image) for image in bracket.images], color=DARK_MARK, edgecolor=INK)
     left.bar_label(bars, fmt="%.0f%%", fontsize=9)
@@ -186,14 +184,3 @@ def one_photo_figure(bracket):
         ax.grid(False)
     headline(fig, "Neither the range nor the curve can be had from one photograph")
     return fig
-
-
-def one_photo_errors(bracket) -> list[tuple]:
-    """For each photograph the RadianceError of two guesses: by a gamma of 2.2, and by the camera's true curve."""
-    crf, truth = bracket.truth.crf, bracket.truth.radiance
-    errors = []
-    for image in bracket.images:
-        by_gamma = np.maximum(image / np.float32(255), 1 / 512) ** 2.2  # value 0 is not zero light
-        by_curve = np.exp(np.stack([g[image[..., c]] for c, g in enumerate(crf)], axis=-1))
-        errors.append((radiance_error(by_gamma, truth), radiance_error(by_curve, truth)))
-    return errors
