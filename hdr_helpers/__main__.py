@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdr_helpers.align import Alignment, align_mtb, crop_bracket, crop_common, shift_image
+from hdr_helpers.align import align_mtb, crop_bracket, unaligned
 from hdr_helpers.crf import recover_crf
 from hdr_helpers.load import Bracket, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
@@ -78,6 +78,10 @@ def _check_output(out: Path, bracket: Path, overwrite: bool) -> None:
         raise FileExistsError(f"{out} already holds {', '.join(there)}; give another folder with -o, or --overwrite.")
 
 
+def _spelled(dx, dy, degrees) -> str:
+    return f"{dx:+.1f} {dy:+.1f} {degrees:+.2f}" if degrees else f"{dx:+.0f} {dy:+.0f}"
+
+
 def _run(bracket: Bracket, out: Path, options) -> None:
     # Only now: drawing is slow to import, and a typing error should not wait for it.
     from hdr_helpers.lab.data import with_truth
@@ -89,22 +93,18 @@ def _run(bracket: Bracket, out: Path, options) -> None:
     for note in bracket.notes:
         print(f"Note: {note}")
 
-    truth = with_truth(bracket, options.bracket).truth
-    if options.no_align:
-        still, sure = np.zeros((len(bracket), 2), dtype=int), np.zeros(len(bracket), dtype=bool)
-        alignment = Alignment(bracket.images, still, 0, sure)
-    else:
-        alignment = align_mtb(bracket.images)
-    shifts = alignment.shifts
+    bracket = with_truth(bracket, options.bracket)
+    alignment = unaligned(bracket.images) if options.no_align else align_mtb(bracket.images, valid=bracket.valid)
     aligned = crop_bracket(bracket, alignment)
     shares = clipping(aligned.images, aligned.valid)
-    print(f"\n{'photograph':24} {'time (s)':>10} {'shift (px)':>11} {'too dark':>9} {'too bright':>11}")
+    print(f"\n{'photograph':24} {'time (s)':>10} {'moved by (px, degrees)':>23} {'too dark':>9} {'too bright':>11}")
+    motions = [_spelled(*s, r) for s, r in zip(alignment.shifts, alignment.rotations, strict=True)]
     rows = zip(
-        bracket.names, bracket.times, shifts, shares.too_dark, shares.too_bright, alignment.doubtful, strict=True
+        bracket.names, bracket.times, motions, shares.too_dark, shares.too_bright, alignment.doubtful, strict=True
     )
-    for name, seconds, (dx, dy), dark, bright, doubt in rows:
-        mark = "  not sure of its shift; left beside its neighbour" if doubt else ""
-        print(f"{name:24} {seconds:10.6g} {f'{dx:+d} {dy:+d}':>11} {dark:9.2%} {bright:11.2%}{mark}")
+    for name, seconds, motion, dark, bright, doubt in rows:
+        mark = "  not sure where it lies; left beside its neighbour" if doubt else ""
+        print(f"{name:24} {seconds:10.6g} {motion:>23} {dark:9.2%} {bright:11.2%}{mark}")
     print(
         f"Clipped in every exposure: {shares.everywhere_bright:.3%} of the pixels are too bright in all of "
         f"them, {shares.everywhere_dark:.3%} too dark."
@@ -116,10 +116,8 @@ def _run(bracket: Bracket, out: Path, options) -> None:
     print(f"Dynamic range of the scene: {dynamic_range_stops(radiance):.1f} stops (99.9th over 0.1th percentile).")
     picture = tonemap(radiance, options.tonemap)
 
-    if truth is not None:
-        # The radiance lies where the reference photograph lies.
-        (known,) = crop_common([shift_image(truth.radiance, truth.shifts[alignment.reference])], shifts)
-        error = radiance_error(radiance, known)
+    if aligned.truth is not None:
+        error = radiance_error(radiance, aligned.truth.radiance)
         print(f"The truth is known here: median error {error.median:.3f} stops, 95% below {error.p95:.3f}.")
 
     table = np.column_stack([np.arange(crf.shape[1]), crf.T])

@@ -23,14 +23,18 @@ __all__ = ["Bracket", "BracketError", "Truth", "in_8_bits", "load_bracket"]
 class Truth:
     """What a virtual camera knows about its own photographs.
 
-    radiance : (H, W, 3) float32, relative linear radiance behind the lens, RGB
+    radiance : (H, W, 3) float32, relative linear radiance behind the lens, RGB, as it was in the middle photograph
     crf : (3, 256) float64, log inverse response of each channel, crf[:, 128] = 0
-    shifts : (P, 2) int, (dx, dy) pixels by which the hand moved each picture right and down, or None
+    shifts : (P, 2), (dx, dy) pixels by which the hand moved each picture right and down, or None
+    rotations : (P,) degrees by which it turned each counter-clockwise about its middle, before the shift, or None
+    moved : (H, W) bool, True where something in the scene was elsewhere in another photograph, or None
     """
 
     radiance: np.ndarray
     crf: np.ndarray
     shifts: np.ndarray | None = None
+    rotations: np.ndarray | None = None
+    moved: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)

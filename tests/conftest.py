@@ -8,7 +8,9 @@ import cv2
 import pytest
 
 from hdr_helpers.lab import data
-from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, scene
+from hdr_helpers.lab.brackets import CHAPEL_TIMES
+from hdr_helpers.lab.camera import Camera
+from hdr_helpers.lab.scenes import chapel_scene
 
 # Notebooks under test keep their results away from a student's own; kernels inherit this.
 os.environ["HDR_RESULTS"] = tempfile.mkdtemp(prefix="hdr_results_")
@@ -24,7 +26,7 @@ def chapel():
 @pytest.fixture(scope="session")
 def small_bracket():
     """A part of the chapel, 160 x 120 pixels, at 1/400, 1/60, 1/10, 0.6 and 4 seconds; with its truth."""
-    return Camera(seed=3, jpeg_quality=None).shoot(scene("chapel")[100:220, 200:360], CHAPEL_TIMES[::2])
+    return Camera(seed=3, jpeg_quality=None).shoot(chapel_scene()[100:220, 200:360], CHAPEL_TIMES[::2])
 
 
 @pytest.fixture

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from hdr_helpers.align import align_mtb, bitmaps, crop_common, shift_image
-from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, scene
+from hdr_helpers.align import align_mtb, bitmaps, crop_common, move_image
+from hdr_helpers.lab.brackets import CHAPEL_TIMES
+from hdr_helpers.lab.camera import Camera
+from hdr_helpers.lab.scenes import chapel_scene
 from hdr_helpers.load import load_bracket
 
 
@@ -12,14 +14,14 @@ from hdr_helpers.load import load_bracket
 @pytest.mark.parametrize("seed", [1, 2])
 def test_known_shifts_are_recovered_exactly(seed):
     moves = np.random.default_rng(seed).integers(-20, 21, (9, 2))
-    found = align_mtb(Camera(seed=seed).shoot(scene("chapel"), CHAPEL_TIMES, moves).images)
+    found = align_mtb(Camera(seed=seed).shoot(chapel_scene(), CHAPEL_TIMES, moves).images)
     assert np.array_equal(found.shifts, moves[found.reference] - moves)
     assert not found.doubtful.any()
 
 
 def test_aligned_photographs_are_those_of_a_tripod():
     quiet = Camera(full_well=1e12, read_noise=0, non_uniformity=0, bits=16, jpeg_quality=None)
-    radiance = scene("chapel")[:300, 200:600]
+    radiance = chapel_scene()[:300, 200:600]
     moves = np.array([(3, -2), (-4, 5), (0, 0), (2, 6)])
     times = CHAPEL_TIMES[3:7]
     found = align_mtb(quiet.shoot(radiance, times, moves).images)
@@ -37,7 +39,7 @@ def test_the_middle_photograph_stays_where_it_was(small_bracket):
 @pytest.mark.parametrize("size, shift", [((560, 816), (40, 0)), ((240, 300), (20, 0)), ((240, 300), (-18, 12))])
 def test_a_shift_that_small_pictures_can_not_show_is_found_or_doubtful(size, shift):
     # All are within max_shift, but not within reach of a pyramid that ends at 16 pixels.
-    radiance = scene("chapel")[-size[0] :, -size[1] :]
+    radiance = chapel_scene()[-size[0] :, -size[1] :]
     found = align_mtb(Camera(seed=4).shoot(radiance, CHAPEL_TIMES[4:6], [(0, 0), shift]).images)
     assert found.doubtful[0] or found.shifts[0].tolist() == list(shift)
 
@@ -78,9 +80,9 @@ def test_aligning_refuses_different_sizes(small_bracket):
 
 
 @pytest.mark.parametrize("shift", [(0, 0), (3, 2), (-3, 2), (4, -1), (-2, -5), (12, 0), (0, -40)])
-def test_shift_image_moves_right_and_down_and_fills_with_zero(shift):
+def test_move_image_moves_right_and_down_and_fills_with_zero(shift):
     image = np.random.default_rng(2).integers(1, 256, (9, 12, 3)).astype(np.uint8)
-    moved = shift_image(image, shift)
+    moved = move_image(image, shift)
     for row, col in np.ndindex(9, 12):
         r, c = row - shift[1], col - shift[0]
         expected = image[r, c] if 0 <= r < 9 and 0 <= c < 12 else [0, 0, 0]  # nothing comes round the edge
@@ -89,7 +91,7 @@ def test_shift_image_moves_right_and_down_and_fills_with_zero(shift):
 
 def test_crop_common_keeps_all_pixels_that_every_frame_shows_and_no_other():
     shifts = np.array([(3, -2), (0, 0), (-4, 1), (2, 5)])
-    shown = [shift_image(np.ones((30, 40), np.uint8), shift) for shift in shifts]
+    shown = [move_image(np.ones((30, 40), np.uint8), shift) for shift in shifts]
     assert crop_common(shown, shifts)[0].shape == (30 - 5 - 2, 40 - 3 - 4)
     assert np.all(crop_common(shown, shifts))
     assert np.sum(np.all(shown, axis=0)) == crop_common(shown, shifts)[0].size

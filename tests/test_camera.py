@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from hdr_helpers.lab import data
-from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, make_chapel, scene
+from hdr_helpers.lab.brackets import CHAPEL_TIMES, make_chapel
+from hdr_helpers.lab.camera import Camera
+from hdr_helpers.lab.scenes import chapel_scene
 
 QUIET = Camera(full_well=1e12, read_noise=0, non_uniformity=0, bits=16, jpeg_quality=None)
 
@@ -68,7 +70,7 @@ def test_twice_the_time_is_twice_the_light_until_it_clips():
 
 
 def test_photographs_of_a_quiet_camera_hold_the_truth():
-    bracket = QUIET.shoot(scene("chapel")[100:160, 200:280], CHAPEL_TIMES[:3])
+    bracket = QUIET.shoot(chapel_scene()[100:160, 200:280], CHAPEL_TIMES[:3])
     scale = []
     for image, seconds in zip(bracket.images, bracket.times, strict=True):
         usable = (image > 30) & (image < 250)
@@ -89,7 +91,7 @@ def test_noise_is_that_of_the_photons_and_of_reading():
 
 
 def test_a_shift_moves_the_picture_right_and_down():
-    radiance, times = scene("chapel")[:60, :80], CHAPEL_TIMES[4:6]
+    radiance, times = chapel_scene()[:60, :80], CHAPEL_TIMES[4:6]
     steady, shaken = QUIET.shoot(radiance, times), QUIET.shoot(radiance, times, [(0, 0), (3, -2)])
     expected = steady.images[1][3 + 2 : -3 + 2, 3 - 3 : -3 - 3]
     assert np.abs(shaken.images[1].astype(int) - expected).max() <= 1
@@ -105,7 +107,7 @@ def test_the_chapel_is_made_again_byte_for_byte(tmp_path):
 
 
 def test_the_chapels_truth_is_exactly_what_the_sensor_saw(chapel):
-    assert np.array_equal(chapel.truth.radiance, scene("chapel")[24:-24, 24:-24])
+    assert np.array_equal(chapel.truth.radiance, chapel_scene()[24:-24, 24:-24])
     assert np.array_equal(chapel.truth.crf, Camera().crf())
     np.testing.assert_allclose(chapel.times, CHAPEL_TIMES)
     assert chapel.images[0].shape == chapel.truth.radiance.shape

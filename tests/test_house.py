@@ -31,25 +31,28 @@ def test_a_stage_imports_only_numbers_and_earlier_stages(stage):
     earlier = {f"hdr_helpers.{name}" for name in STAGES[: STAGES.index(stage)]}
     for module in imports(ROOT / "hdr_helpers" / f"{stage}.py"):
         if module.startswith("hdr_helpers"):
-            rooms = ("hdr_helpers.papers", *["hdr_helpers._reading"] * (stage == "load"))
+            behind = {"load": ["hdr_helpers._reading"], "align": ["hdr_helpers._registering"]}
+            rooms = ("hdr_helpers.papers", *behind.get(stage, []))
             assert module in earlier or module.startswith(rooms)
         else:
             assert module.split(".")[0] not in {"matplotlib", "IPython", "ipywidgets", "nbgrader"}
 
 
-def test_a_room_behind_loading_imports_only_other_rooms_and_papers():
-    rooms = list((ROOT / "hdr_helpers" / "_reading").glob("*.py"))
+@pytest.mark.parametrize("behind", ["_reading", "_registering"])
+def test_a_room_behind_a_stage_imports_only_its_neighbours_and_papers(behind):
+    rooms = list((ROOT / "hdr_helpers" / behind).glob("*.py"))
     assert rooms
     for room in rooms:
         ours = [module for module in imports(room) if module.startswith("hdr_helpers")]
-        assert all(module.startswith(("hdr_helpers._reading", "hdr_helpers.papers")) for module in ours), room.name
+        assert all(module.startswith((f"hdr_helpers.{behind}", "hdr_helpers.papers")) for module in ours), room.name
 
 
 def test_a_paper_imports_no_stage():
     papers = list((ROOT / "hdr_helpers" / "papers").glob("*.py"))
     assert papers
     for paper in papers:
-        assert not [m for m in imports(paper) if m.startswith("hdr_helpers")], paper.name
+        ours = [module for module in imports(paper) if module.startswith("hdr_helpers")]
+        assert all(module.startswith("hdr_helpers.papers") for module in ours), paper.name
 
 
 def test_there_are_five_notebooks_named_like_the_five_stages():

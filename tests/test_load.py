@@ -7,9 +7,10 @@ import zipfile
 import cv2
 import numpy as np
 import pytest
-from photographs import exif_block, write_with_exif
+from photographs import write_with_exif
 
 from hdr_helpers._reading.pictures import Exif, read_exif
+from hdr_helpers.lab.exif import exif_block
 from hdr_helpers.load import Bracket, BracketError, load_bracket
 
 NAMES = ("a_1.png", "a_2.png", "a_3.png", "a_4.png")

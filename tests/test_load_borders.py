@@ -9,10 +9,12 @@ import pytest
 from photographs import known
 
 from hdr_helpers.__main__ import main
-from hdr_helpers.align import Alignment, align_mtb, crop_bracket, shift_image
+from hdr_helpers.align import align_mtb, crop_bracket, move_image, unaligned
 from hdr_helpers.crf import recover_crf, sample_pixels
-from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, handheld_chapel, scene, sensitivity
+from hdr_helpers.lab.brackets import CHAPEL_TIMES, handheld_chapel
+from hdr_helpers.lab.camera import Camera, sensitivity
 from hdr_helpers.lab.metrics import radiance_error
+from hdr_helpers.lab.scenes import chapel_scene
 from hdr_helpers.load import Bracket, BracketError, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec
 from hdr_helpers.tonemap import luminance
@@ -22,7 +24,7 @@ BLUE, BLACK, WHITE, GREY = (0, 0, 255), (0, 0, 0), (255, 255, 255), (128, 128, 1
 
 def border(shape, shift):
     """Where a photograph of this shape still is one after a shift, (H, W) bool."""
-    return shift_image(np.ones(shape[:2], np.uint8), shift) > 0
+    return move_image(np.ones(shape[:2], np.uint8), shift) > 0
 
 
 def filled(images, valid, colour):
@@ -55,7 +57,7 @@ def aligned():
     """Photographs of the hand-held chapel, moved back onto each other, and where they are valid; with times."""
     bracket = handheld_chapel()
     shifts = -bracket.truth.shifts[FRAMES]
-    images = [shift_image(bracket.images[frame], shift) for frame, shift in zip(FRAMES, shifts, strict=True)]
+    images = [move_image(bracket.images[frame], shift) for frame, shift in zip(FRAMES, shifts, strict=True)]
     return images, [border(images[0].shape, shift) for shift in shifts], bracket.times[FRAMES]
 
 
@@ -144,9 +146,9 @@ SKIES = {"night": 0.0, "a sky that is white in all exposures": 1e6, "a sky that 
 @pytest.mark.parametrize("hand", [0, 15], ids=["from a tripod", "from the hand"])
 @pytest.mark.parametrize("light", SKIES.values(), ids=SKIES.keys())
 def test_no_border_is_seen_in(tmp_path, light, hand):
-    radiance = scene("chapel")[100:300, 200:500].copy()
+    radiance = chapel_scene()[100:300, 200:500].copy()
     radiance[:100, :200] = light
-    gain = sensitivity(scene("chapel"), CHAPEL_TIMES[0])
+    gain = sensitivity(chapel_scene(), CHAPEL_TIMES[0])
     camera, images = Camera(seed=6), []
     for frame, (dx, dy) in enumerate(np.random.default_rng(1).integers(-hand, hand + 1, (5, 2))):
         image = camera.photograph(gain * CHAPEL_TIMES[2 * frame] * radiance, frame)
@@ -318,8 +320,8 @@ def test_masks_move_with_their_photographs_and_both_are_cut_to_the_same_part(sma
     valid = [rng.random((120, 160)) < 0.8 for _ in shifts]
     images = filled([np.minimum(image, 254) for image in small_bracket.images], valid, mark)
     bracket = replace(small_bracket, images=tuple(images), valid=tuple(valid))
-    moved = tuple(shift_image(image, shift) for image, shift in zip(images, shifts, strict=True))
-    cut = crop_bracket(bracket, Alignment(moved, shifts, 1, np.zeros(5, bool)))
+    moved = tuple(move_image(image, shift) for image, shift in zip(images, shifts, strict=True))
+    cut = crop_bracket(bracket, replace(unaligned(moved), shifts=shifts, reference=1))
     assert cut.images[0].shape[:2] == cut.valid[0].shape == (120 - 9, 160 - 10)
     for image, mask, before, (dx, dy) in zip(cut.images, cut.valid, valid, shifts, strict=True):
         assert mask.dtype == bool
@@ -366,7 +368,7 @@ def test_masks_work_on_16_bits_as_on_8(bordered):
 @pytest.fixture(scope="session")
 def fine():
     """A part of the chapel without noise in steps of 1/65535; the bracket and its true radiance."""
-    radiance, times, camera = scene("chapel")[100:220, 200:360], CHAPEL_TIMES[::2], Camera()
+    radiance, times, camera = chapel_scene()[100:220, 200:360], CHAPEL_TIMES[::2], Camera()
     gain = sensitivity(radiance, times[0])
     images = [
         np.stack([np.rint(65535 * camera.respond(gain * t * radiance[..., c], c)) for c in range(3)], axis=-1)
@@ -398,7 +400,7 @@ def test_the_response_of_16_bits_is_that_of_their_upper_8(fine):
 @pytest.mark.parametrize("low", [0, 77, 255])
 def test_shifts_are_found_in_16_bits_as_in_8(low):
     shifts = np.array([(0, 0), (5, -3), (-7, 2)])
-    bracket = Camera(seed=2).shoot(scene("chapel")[:250, :350], CHAPEL_TIMES[4:7], shifts)
+    bracket = Camera(seed=2).shoot(chapel_scene()[:250, :350], CHAPEL_TIMES[4:7], shifts)
     found = align_mtb([image.astype(np.uint16) * 256 + low for image in bracket.images])
     plain = align_mtb(bracket.images)
     assert np.array_equal(found.shifts, plain.shifts)

@@ -8,12 +8,15 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from photographs import exif_block, histograms, known, write_with_exif
+from photographs import histograms, known, write_with_exif
 
 from hdr_helpers._reading.pictures import Exif, read_exif
 from hdr_helpers._reading.times import find_times
-from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, handheld_chapel, scene, sensitivity
+from hdr_helpers.lab.brackets import CHAPEL_TIMES, handheld_chapel
+from hdr_helpers.lab.camera import Camera, sensitivity
 from hdr_helpers.lab.data import DATA
+from hdr_helpers.lab.exif import exif_block
+from hdr_helpers.lab.scenes import chapel_scene
 from hdr_helpers.load import load_bracket
 
 NAMES = tuple(f"a_{i}.png" for i in range(1, 6))
@@ -46,7 +49,7 @@ def misnamed(times, frame, factor):
 @cache
 def part():
     """Radiance of a part of the chapel that has lights and shadows, (120, 160, 3)."""
-    return scene("chapel")[100:220, 200:360]
+    return chapel_scene()[100:220, 200:360]
 
 
 def expose(exposures, camera=None, first_frame=0):
@@ -78,7 +81,7 @@ def test_the_chapel_loads_without_a_note(chapel):
 def test_right_times_are_not_doubted_whatever_the_camera_and_the_scene(seed):
     rng = np.random.default_rng(seed)
     response = tuple(zip(rng.uniform(1.6, 2.6, 3), rng.uniform(30, 150, 3), rng.uniform(0.3, 0.6, 3), strict=True))
-    whole = scene("chapel")
+    whole = chapel_scene()
     height, width = rng.integers(90, 140), rng.integers(130, 200)
     top, left = rng.integers(0, whole.shape[0] - height), rng.integers(0, whole.shape[1] - width)
     camera = Camera(response=response, seed=seed)

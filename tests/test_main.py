@@ -11,8 +11,10 @@ import pytest
 
 from hdr_helpers.__main__ import main
 from hdr_helpers.lab import data
-from hdr_helpers.lab.camera import CHAPEL_TIMES, Camera, scene
+from hdr_helpers.lab.brackets import CHAPEL_TIMES
+from hdr_helpers.lab.camera import Camera
 from hdr_helpers.lab.metrics import crf_rmse
+from hdr_helpers.lab.scenes import chapel_scene
 
 NAMES = ("a_1.png", "a_2.png", "a_3.png", "a_4.png", "a_5.png")
 TIMES = {"times.txt": "1/400 1/60 1/10 0.6 4"}
@@ -53,7 +55,7 @@ def test_what_was_done_is_printed(save, tmp_path, capsys, small_bracket):
 
 
 def test_shifts_are_found_and_printed_and_not_looked_for_when_not_wanted(tmp_path, capsys):
-    bracket = Camera(seed=2).shoot(scene("chapel")[:250, :350], CHAPEL_TIMES[4:7], [(0, 0), (0, 0), (5, -3)])
+    bracket = Camera(seed=2).shoot(chapel_scene()[:250, :350], CHAPEL_TIMES[4:7], [(0, 0), (0, 0), (5, -3)])
     for name, image in zip(("1.png", "2.png", "3.png"), bracket.images, strict=True):
         cv2.imwrite(str(tmp_path / name), image[..., ::-1])
     (tmp_path / "t.txt").write_text("0.1 0.25 0.6")
@@ -209,7 +211,7 @@ def test_results_are_not_written_among_the_photographs(save, capsys):
 
 def test_a_hand_held_brackets_true_error_is_measured_where_the_reference_lies(tmp_path, capsys):
     shifts = [(3, -5), (-6, 2), (4, 6), (0, -3), (-2, 1)]
-    bracket = Camera(seed=5).shoot(scene("chapel")[60:320, 200:560], CHAPEL_TIMES[2:7], shifts)
+    bracket = Camera(seed=5).shoot(chapel_scene()[60:320, 200:560], CHAPEL_TIMES[2:7], shifts)
     folder = tmp_path / "handheld"
     folder.mkdir()
     for name, image, seconds in zip("abcde", bracket.images, bracket.times, strict=True):

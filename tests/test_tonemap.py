@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hdr_helpers.lab.camera import scene
+from hdr_helpers.lab.scenes import chapel_scene
 from hdr_helpers.tonemap import OPERATORS, dynamic_range_stops, luminance, to_8bit, tonemap, write_picture
 
 every_operator = pytest.mark.parametrize("operator", sorted(OPERATORS))
@@ -19,7 +19,7 @@ PARAMETERS = [
 
 @pytest.fixture(scope="module")
 def radiance():
-    return scene("chapel")[100:220, 200:360]
+    return chapel_scene()[100:220, 200:360]
 
 
 @every_operator

@@ -2,31 +2,18 @@
 
 Light passes a lens, a sensor and a response, as in Debevec and Malik 1997, figure 1. Random numbers are
 tied to a seed and to the number of the frame, not to the order of calls, so a frame can be shot again.
-
-    python -m hdr_helpers.lab.camera [FOLDER]
-
-makes the course's own bracket, data/chapel, from data/scenes/chapel.npz; the same bytes every time.
 """
 
-import argparse
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
-from hdr_helpers.align import shift_image
+from hdr_helpers.align import Motion, move_image
 from hdr_helpers.crf import LEVELS, MIDDLE
-from hdr_helpers.lab.data import DATA, save_truth
+from hdr_helpers.lab.exif import exif_block
 from hdr_helpers.load import Bracket, Truth
-from hdr_helpers.merge import write_whole
 from hdr_helpers.tonemap import luminance
-
-CHAPEL_TIMES = (1 / 400, 1 / 160, 1 / 60, 1 / 25, 1 / 10, 1 / 4, 0.6, 1.6, 4.0)  # seconds
-CHAPEL_NAMES = ("1/400", "1/160", "1/60", "1/25", "1/10", "1/4", "0.6", "1.6", "4")
-STORED_SCALE = 4  # float16 ends at 65504; the scene does not
 
 
 @dataclass(frozen=True)
@@ -90,25 +77,61 @@ class Camera:
             return image
         return cv2.imdecode(encode_jpeg(image, self.jpeg_quality), cv2.IMREAD_COLOR)[..., ::-1].copy()
 
-    def shoot(self, radiance, times, shifts=None) -> Bracket:
+    def shoot(self, radiance, times, shifts=None, rotations=None) -> Bracket:
         """A bracket of a scene, with its truth.
 
-        radiance : (H, W, 3) float, what the lens gives: relative linear RGB
+        radiance : (H, W, 3) float, what the lens gives: relative linear RGB; or P of them, one for each moment,
+            of a scene in which something moves
         times : (P,) ascending, seconds
-        shifts : (P, 2) whole pixels (dx, dy) by which the hand moved each frame's picture right and down,
-            or None. The border that a shift would leave empty is cut from all frames and from the truth.
+        shifts : (P, 2) pixels (dx, dy) by which the hand moved each frame's picture right and down, or None
+        rotations : (P,) degrees by which it was turned counter-clockwise about its middle, before the shift, or None
+
+        The border that moving would leave empty is cut from all frames and from the truth. The truth is the scene as
+        it was in the middle photograph, not moved by the hand. Motions other than by whole pixels are interpolated,
+        in the logarithm of the radiance.
         """
-        moves = np.zeros((len(times), 2), dtype=int) if shifts is None else np.asarray(shifts)
-        margin = int(np.abs(moves).max())
-        inside = np.s_[margin : radiance.shape[0] - margin, margin : radiance.shape[1] - margin]
-        gain = sensitivity(radiance, times[0])
+        count = len(times)
+        moments = [radiance] * count if np.ndim(radiance) == 3 else radiance
+        shifts = np.zeros((count, 2), dtype=int) if shifts is None else np.asarray(shifts)
+        turned = rotations is not None
+        rotations = np.asarray(rotations, dtype=np.float64) if turned else np.zeros(count)
+        reference = moments[count // 2]
+        margin = self.margin(reference.shape, shifts, rotations)
+        inside = np.s_[margin : reference.shape[0] - margin, margin : reference.shape[1] - margin]
+        gain = sensitivity(reference, times[0])
         images = [
-            self.photograph(gain * t * shift_image(radiance, move)[inside], frame)
-            for frame, (t, move) in enumerate(zip(times, moves, strict=True))
+            self.photograph(gain * t * _moved(moment, shift, degrees)[inside], frame)
+            for frame, (moment, t, shift, degrees) in enumerate(zip(moments, times, shifts, rotations, strict=True))
         ]
-        truth = Truth(np.asarray(radiance[inside], dtype=np.float32), self.crf(), moves)
-        names = tuple(f"frame_{frame:02d}" for frame in range(len(times)))
+        moved = None
+        if len(set(map(id, moments))) > 1:
+            moved = np.logical_or.reduce([_differs(moment, reference)[inside] for moment in moments])
+        truth = Truth(
+            radiance=np.asarray(reference[inside], dtype=np.float32),
+            crf=self.crf(),
+            shifts=shifts,
+            rotations=rotations if turned else None,
+            moved=moved,
+        )
+        names = tuple(f"frame_{frame:02d}" for frame in range(count))
         return Bracket(tuple(images), np.array(times), names, source="the virtual camera", truth=truth)
+
+    @staticmethod
+    def margin(shape, shifts, rotations) -> int:
+        """Pixels that shoot cuts from every side of a scene of this shape."""
+        reach = [np.abs(s).max() + Motion(degrees=d).reach(shape) for s, d in zip(shifts, rotations, strict=True)]
+        return int(np.ceil(max(reach)))
+
+
+def _differs(radiance, reference) -> np.ndarray:
+    """(H, W) bool: where two moments of a scene differ by more than 1% in a channel."""
+    return np.any(np.abs(radiance - reference) > 0.01 * reference, axis=2)
+
+
+def _moved(radiance, shift, degrees) -> np.ndarray:
+    if not degrees and np.all(np.equal(np.mod(shift, 1), 0)):
+        return move_image(radiance, shift)
+    return np.exp(move_image(np.log(radiance), shift, degrees))
 
 
 def sensitivity(radiance, shortest: float) -> float:
@@ -119,52 +142,15 @@ def sensitivity(radiance, shortest: float) -> float:
     return 0.9 / (float(np.percentile(luminance(radiance), 99.9)) * shortest)
 
 
-def lens(radiance, sigma: float = 0.6) -> np.ndarray:
-    """What a lens makes of scene radiance (H, W, 3): a little blur (sigma in pixels). Float64."""
-    return gaussian_filter(np.asarray(radiance, dtype=np.float64), (sigma, sigma, 0), mode="nearest")
+def encode_jpeg(image, quality: int, seconds: tuple[int, int] | None = None) -> np.ndarray:
+    """JPEG bytes, (n,) uint8, of an RGB picture, colour at full resolution (4:4:4).
 
-
-def encode_jpeg(image, quality: int) -> np.ndarray:
-    """JPEG bytes, (n,) uint8, of an RGB picture, colour at full resolution (4:4:4)."""
+    seconds : exposure time as numerator and denominator, written as EXIF; None writes no EXIF
+    """
+    bgr = np.ascontiguousarray(image[..., ::-1])
     options = (cv2.IMWRITE_JPEG_QUALITY, quality,
                cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)  # fmt: skip
-    return cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), options)[1]
-
-
-def scene(name: str) -> np.ndarray:
-    """A path-traced scene of data/scenes behind the lens, (H, W, 3) float32, relative radiance, RGB.
-
-    Rounded to what a truth file holds, so that the stored truth is exactly what the sensor saw.
-    """
-    with np.load(DATA / "scenes" / f"{name}.npz") as stored:
-        behind_lens = lens(stored["radiance"].astype(np.float64) * 8)
-    return (behind_lens / STORED_SCALE).astype(np.float16).astype(np.float32) * STORED_SCALE
-
-
-def make_chapel(folder) -> None:
-    """Shoot the chapel from a tripod and write photographs, shutter.txt and truth.npz into a folder."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    camera = Camera(jpeg_quality=None)  # compressed once, when it is written
-    radiance = scene("chapel")[24:-24, 24:-24]  # the scene has a margin for hand-held brackets
-    bracket = camera.shoot(radiance, CHAPEL_TIMES)
-    listed = ["# photograph  exposure time in seconds"]
-    for i, (image, spelled) in enumerate(zip(bracket.images, CHAPEL_NAMES, strict=True)):
-        name = f"chapel_{i + 1}.jpg"
-        write_whole(folder / name, encode_jpeg(image, Camera.jpeg_quality).tobytes())
-        listed.append(f"{name} {spelled}")
-    write_whole(folder / "shutter.txt", ("\n".join(listed) + "\n").encode())
-    save_truth(folder, bracket.truth, STORED_SCALE)
-
-
-@cache
-def handheld_chapel() -> Bracket:
-    """The chapel shot from the hand: each frame has moved by up to 20 pixels; with the truth."""
-    shifts = np.random.default_rng(4).integers(-20, 21, (len(CHAPEL_TIMES), 2))
-    return Camera().shoot(scene("chapel"), CHAPEL_TIMES, shifts)
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Make the course's chapel bracket with the virtual camera.")
-    parser.add_argument("folder", nargs="?", default=DATA / "chapel", help="where to (default: data/chapel)")
-    make_chapel(parser.parse_args().folder)
+    if seconds is None:
+        return cv2.imencode(".jpg", bgr, options)[1]
+    exif = np.frombuffer(exif_block(seconds=seconds), np.uint8)
+    return cv2.imencodeWithMetadata(".jpg", bgr, [cv2.IMAGE_METADATA_EXIF], [exif], options)[1]

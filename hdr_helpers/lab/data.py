@@ -17,6 +17,12 @@ DATA = Path(__file__).parents[2] / "data"
 
 
 @cache
+def handheld() -> Bracket:
+    """The cloister, five JPEG photographs shot from the hand while two monks walk, with their truth."""
+    return with_truth(load_bracket(DATA / "handheld"), DATA / "handheld")
+
+
+@cache
 def chapel() -> Bracket:
     """The chapel, nine JPEG photographs from 1/400 s to 4 s, shot by the virtual camera, with their truth."""
     return with_truth(load_bracket(DATA / "chapel"), DATA / "chapel")
@@ -33,7 +39,7 @@ def with_truth(bracket: Bracket, folder) -> Bracket:
     try:
         with np.load(path) as stored:
             radiance = (stored["radiance"].astype(np.float32) * stored["scale"]).astype(np.float32)
-            truth = Truth(radiance, stored["crf"], stored["shifts"])
+            truth = Truth(radiance, stored["crf"], stored["shifts"], stored.get("rotations"), stored.get("moved"))
     except (KeyError, ValueError) as problem:
         raise BracketError(f"{path} is not a truth file ({problem}); remove it, or make the bracket again.") from None
     if truth.radiance.shape != bracket.images[0].shape:
@@ -59,13 +65,14 @@ def what_loading_says(bracket_folder, times: dict) -> list[str]:
 
 
 def save_truth(folder, truth: Truth, scale: float) -> None:
-    """Write folder/truth.npz: radiance / scale as float16, crf as float64, and the shifts.
+    """Write folder/truth.npz: radiance / scale as float16, crf as float64, shifts, and rotations and moved if known.
 
     The same bytes everywhere, so neither np.savez, which writes the name of the system, nor a compressor,
     which would save a tenth and depends on its version.
     """
     half = (truth.radiance / scale).astype(np.float16)
-    arrays = {"radiance": half, "scale": np.float32(scale), "crf": truth.crf, "shifts": truth.shifts.astype("<i8")}
+    arrays = {"radiance": half, "scale": np.float32(scale), "crf": truth.crf, "shifts": truth.shifts}
+    arrays |= {k: v for k, v in (("rotations", truth.rotations), ("moved", truth.moved)) if v is not None}
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
         for name, array in arrays.items():

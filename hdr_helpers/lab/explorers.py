@@ -64,7 +64,7 @@ def align_explorer(fixed, moving, reach=24):
         return jpeg_bytes(picture), f"<b>{coloured:.2%}</b> of the pixels disagree at ({dx:+d}, {dy:+d})"
 
     def solve(_):
-        right.value, down.value = (int(s) for s in align_mtb([moving, fixed]).shifts[0])
+        right.value, down.value = (round(s) for s in align_mtb([moving, fixed]).shifts[0])
 
     button.on_click(solve)
     return _explorer(draw, {"dx": right, "dy": down}, [button])

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from hdr_helpers.align import bitmaps, shift_image
+from hdr_helpers.align import bitmaps, move_image
 from hdr_helpers.lab.figures.style import INK, THREE, headline, new_figure, pictures_figure, plain, seconds
 
 
@@ -42,7 +42,7 @@ def hand_figure(fixed, moving, shift):
 
     fixed, moving : (bright, clear) of align.bitmaps. Returns (H, W, 3) uint8.
     """
-    bright, clear = (shift_image(bits, shift) for bits in moving)
+    bright, clear = (move_image(bits, shift) for bits in moving)
     counted = (clear & fixed[1]) > 0
     picture = np.full((*bright.shape, 3), 205, dtype=np.uint8)
     picture[fixed[0] > 0] = 255

@@ -8,7 +8,7 @@ from matplotlib import patheffects
 
 from hdr_helpers._reading.evidence import transfer
 from hdr_helpers.crf import CLIPPED, NOISE
-from hdr_helpers.lab.camera import Camera, scene
+from hdr_helpers.lab.camera import Camera
 from hdr_helpers.lab.figures.style import (
     ACCENT,
     BRIGHT_MARK,
@@ -24,6 +24,7 @@ from hdr_helpers.lab.figures.style import (
     plain,
     seconds,
 )
+from hdr_helpers.lab.scenes import chapel_scene
 
 CURVES = (("gamma 2.2, a guess", BRIGHT_MARK, ""), ("the camera's true curve", "#009E73", "//"))
 PREVIEW = 800  # pixels across of a single photograph
@@ -133,7 +134,7 @@ def transfer_figure(bracket, j):
 
 def iso_figure():
     """A dim part of the chapel twice, equally bright, the second time from a sixteenth of the photons."""
-    part = scene("chapel")[220:340, 180:360]
+    part = chapel_scene()[220:340, 180:360]
     camera = Camera(jpeg_quality=None)
     cameras = camera, replace(camera, full_well=camera.full_well / 16)  # fewer photons to a pixel value
     pictures = [c.photograph(0.15 * part / part.mean(), frame=0) for c in cameras]
