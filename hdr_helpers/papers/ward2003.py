@@ -91,7 +91,7 @@ def halved(gray, valid) -> tuple[np.ndarray, np.ndarray]:
     """
     size = max(gray.shape[1] // 2, 1), max(gray.shape[0] // 2, 1)
     small, whole = (cv2.resize(a, size, interpolation=cv2.INTER_AREA) for a in (gray, valid))
-    return small, cv2.compare(whole, 255, cv2.CMP_EQ)
+    return small, cv2.threshold(whole, 254, 255, cv2.THRESH_BINARY)[1]
 
 
 def _threshold(histogram, percentile) -> int:
