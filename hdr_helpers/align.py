@@ -11,15 +11,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
+import cv2
 import numpy as np
 
 from hdr_helpers._registering.blocks import View, Vote, ask_blocks, refine
 from hdr_helpers._registering.motion import Motion, common_part, move_image
-from hdr_helpers.load import Bracket, Truth
+from hdr_helpers.load import Bracket, Truth, in_8_bits
+from hdr_helpers.papers.kang2003 import register_locally
 from hdr_helpers.papers.ward2003 import PERCENTILES, bitmaps, clear_share, likely_shifts
 
 __all__ = [
     "Alignment",
+    "Ghosts",
     "Match",
     "Motion",
     "align_mtb",
@@ -27,6 +30,7 @@ __all__ = [
     "crop_bracket",
     "crop_common",
     "move_image",
+    "remove_ghosts",
     "unaligned",
 ]
 
@@ -36,6 +40,8 @@ MORE = 2  # other percentiles tried where the median is not enough
 PARTNERS = 3  # neighbours, next first, with which a photograph is compared
 MAX_CHANCE = 1e-4  # a match is trusted if blocks would agree like this by accident less often
 TURNED = 0.5  # pixels by which a turn moves the corners; less is no turn
+GLANCE = 2e5  # pixels that are enough to see what moves
+DARK, BRIGHT = 5, 250  # grey levels within which a photograph shows something
 
 
 @dataclass(frozen=True)
@@ -220,3 +226,50 @@ def _cut_truth(truth: Truth, alignment: Alignment) -> Truth:
     radiance = move_image(truth.radiance, shift, degrees)[part]
     moved = None if truth.moved is None else move_image(truth.moved, shift, degrees)[part]
     return Truth(radiance, truth.crf, moved=moved)
+
+
+@dataclass(frozen=True)
+class Ghosts:
+    """What remove_ghosts found.
+
+    bracket : Bracket in which every moving thing is where the reference has it: valid says where each photograph may
+        speak, and what optical flow could follow was warped
+    reference : index of the photograph that has the moving things where they stay
+    moved : (H, W) bool, where at least one photograph lost its say, or was warped
+    """
+
+    bracket: Bracket
+    reference: int
+    moved: np.ndarray
+
+
+def remove_ghosts(bracket: Bracket, reference: int | None = None) -> Ghosts:
+    """Take the ghosts out of an aligned bracket in which something moves (papers/kang2003.py).
+
+    bracket : Bracket, aligned
+    reference : index of the photograph that says where the moving things are; None takes the one that is black or
+        white in the fewest pixels of what moves, because there it will speak alone
+    Raises ValueError where there is no such photograph.
+    """
+    if reference is None:
+        reference = _best_seen(bracket)
+    images, valid = register_locally(bracket.images, reference, bracket.valid)
+    before = [True] * len(images) if bracket.valid is None else bracket.valid
+    lost = [old & ~new for old, new in zip(before, valid, strict=True)]
+    warped = [np.any(a != b, axis=2) for a, b in zip(images, bracket.images, strict=True) if a is not b]
+    return Ghosts(replace(bracket, images=images, valid=valid), reference, np.logical_or.reduce([*lost, *warped]))
+
+
+def _best_seen(bracket) -> int:
+    """The photograph that is neither black nor white in most of what moves; of equals the one nearest the middle."""
+    scale = min(1.0, np.sqrt(GLANCE / bracket.images[0][..., 0].size))
+    size = [max(1, round(n * scale)) for n in bracket.images[0].shape[1::-1]]
+    images = [cv2.resize(in_8_bits(image), size, interpolation=cv2.INTER_AREA) for image in bracket.images]
+    valid = bracket.valid and [
+        cv2.resize(m.view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0 for m in bracket.valid
+    ]
+    middle = len(images) // 2
+    _, masks = register_locally(images, middle, valid)
+    moved = ~np.logical_and.reduce(masks)
+    seen = [np.count_nonzero(((image > DARK) & (image < BRIGHT)).all(axis=2) & moved) for image in images]
+    return max(range(len(images)), key=lambda k: (seen[k], -abs(k - middle)))

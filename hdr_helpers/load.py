@@ -23,11 +23,11 @@ __all__ = ["Bracket", "BracketError", "Truth", "in_8_bits", "load_bracket"]
 class Truth:
     """What a virtual camera knows about its own photographs.
 
-    radiance : (H, W, 3) float32, relative linear radiance behind the lens, RGB, as it was in the middle photograph
+    radiance : (H, W, 3) float32, relative linear radiance behind the lens, RGB
     crf : (3, 256) float64, log inverse response of each channel, crf[:, 128] = 0
     shifts : (P, 2), (dx, dy) pixels by which the hand moved each picture right and down, or None
     rotations : (P,) degrees by which it turned each counter-clockwise about its middle, before the shift, or None
-    moved : (H, W) bool, True where something in the scene was elsewhere in another photograph, or None
+    moved : (H, W) bool, True where in some photograph the scene was not as radiance has it, or None
     """
 
     radiance: np.ndarray

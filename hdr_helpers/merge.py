@@ -18,7 +18,8 @@ from hdr_helpers.crf import LEVELS, checked_weights, fitted_weights, whole_white
 from hdr_helpers.load import in_8_bits
 
 LAST_RESORT = 1e-5  # of the largest weight: decides only where no photograph has any other weight
-LEAST = 1e-9  # of the largest weight: no sum of weights is 0, whatever the values
+NEXT_RESORT = 1e-4  # by how much less the next photograph decides, where the nearest bound is not valid
+LEAST = 1e-35  # of the largest weight: no sum of weights is 0, however many photographs
 TILE_ROWS = 64  # rows merged at a time: the working arrays stay in the processor's cache
 
 
@@ -98,12 +99,11 @@ def _tables(times, crf, w, values: int) -> tuple[np.ndarray, np.ndarray]:
     """w(z) (g(z) - ln dt) and w(z) for every photograph, each (P, 1, values, 3) float32 as cv2.LUT wants it."""
     z = np.linspace(0, LEVELS - 1, values)  # 256 values, or 65,536 between them
     crf, w = np.array([np.interp(z, np.arange(LEVELS), g) for g in crf]), np.interp(z, np.arange(LEVELS), w)
-    weights = np.maximum(np.tile(w, (len(times), 1)), LEAST * w.max())
-    # Where no photograph is usable the nearest bound decides: of the bright values the shortest exposure's,
-    # of the dark ones the longest's.
-    bright, dark = np.s_[np.argmin(times), values // 2 :], np.s_[np.argmax(times), : values // 2]
-    for side in (bright, dark):
-        weights[side] = np.maximum(weights[side], LAST_RESORT * w.max())
+    # Where no photograph is usable the nearest bound decides: of the bright values the shortest exposure's, of the
+    # dark ones the longest's; where that one is not valid, the next one's.
+    rank = np.argsort(np.argsort(times))
+    nearest = np.where(np.arange(values) >= values // 2, rank[:, None], rank[::-1, None])
+    weights = np.maximum(w, w.max() * np.maximum(LAST_RESORT * NEXT_RESORT**nearest, LEAST))
     weighted = weights[..., None] * (crf.T - np.log(times)[:, None, None])
     weights = np.repeat(weights[..., None], 3, axis=2)
     return tuple(np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))

@@ -24,7 +24,7 @@ CHAPEL_NAMES = ("1/400", "1/160", "1/60", "1/25", "1/10", "1/4", "0.6", "1.6", "
 HANDHELD_TIMES = tuple(Fraction(1, n) for n in (3200, 1000, 320, 100, 30))  # seconds
 HANDHELD_SHIFTS = ((-8.2, -3.1), (4.4, 5.9), (0.0, 0.0), (-5.6, 2.4), (7.3, -4.2))  # pixels
 HANDHELD_ROTATIONS = (-0.22, 0.12, 0.0, -0.10, 0.18)  # degrees
-HANDHELD_NAMES = ("IMG_0416.jpg", "IMG_0415.jpg", "IMG_0414.jpg", "IMG_0413.jpg", "IMG_0412.jpg")  # longest first
+HANDHELD_NAMES = tuple(f"IMG_04{n}.jpg" for n in range(12, 17))
 
 
 def make_chapel(folder) -> None:
@@ -55,11 +55,14 @@ def make_handheld(folder) -> None:
 
 
 def shoot_handheld(camera: Camera) -> Bracket:
-    """The bracket of data/handheld, by any camera: (512, 768, 3) each, the last moment with the shortest exposure."""
-    moments, times = cloister_scene()[::-1], [float(t) for t in HANDHELD_TIMES]
+    """The bracket of data/handheld, by any camera: (512, 768, 3) each.
+
+    Its truth is the moment of the shortest exposure, the only one in which the sunlit floor is not white.
+    """
+    moments, times = cloister_scene(), [float(t) for t in HANDHELD_TIMES]
     margin = MARGIN - camera.margin(moments[0].shape, HANDHELD_SHIFTS, HANDHELD_ROTATIONS)
     inside = np.s_[margin:-margin, margin:-margin]
-    return camera.shoot([moment[inside] for moment in moments], times, HANDHELD_SHIFTS, HANDHELD_ROTATIONS)
+    return camera.shoot([m[inside] for m in moments], times, HANDHELD_SHIFTS, HANDHELD_ROTATIONS, moment=0)
 
 
 @cache

@@ -77,7 +77,7 @@ class Camera:
             return image
         return cv2.imdecode(encode_jpeg(image, self.jpeg_quality), cv2.IMREAD_COLOR)[..., ::-1].copy()
 
-    def shoot(self, radiance, times, shifts=None, rotations=None) -> Bracket:
+    def shoot(self, radiance, times, shifts=None, rotations=None, moment: int | None = None) -> Bracket:
         """A bracket of a scene, with its truth.
 
         radiance : (H, W, 3) float, what the lens gives: relative linear RGB; or P of them, one for each moment,
@@ -85,17 +85,17 @@ class Camera:
         times : (P,) ascending, seconds
         shifts : (P, 2) pixels (dx, dy) by which the hand moved each frame's picture right and down, or None
         rotations : (P,) degrees by which it was turned counter-clockwise about its middle, before the shift, or None
+        moment : index of the photograph in whose moment the truth is; None takes the middle one
 
-        The border that moving would leave empty is cut from all frames and from the truth. The truth is the scene as
-        it was in the middle photograph, not moved by the hand. Motions other than by whole pixels are interpolated,
-        in the logarithm of the radiance.
+        The border that moving would leave empty is cut from all frames and from the truth, which is not moved by the
+        hand. Motions other than by whole pixels are interpolated, in the logarithm of the radiance.
         """
         count = len(times)
         moments = [radiance] * count if np.ndim(radiance) == 3 else radiance
         shifts = np.zeros((count, 2), dtype=int) if shifts is None else np.asarray(shifts)
         turned = rotations is not None
         rotations = np.asarray(rotations, dtype=np.float64) if turned else np.zeros(count)
-        reference = moments[count // 2]
+        reference = moments[count // 2 if moment is None else moment]
         margin = self.margin(reference.shape, shifts, rotations)
         inside = np.s_[margin : reference.shape[0] - margin, margin : reference.shape[1] - margin]
         gain = sensitivity(reference, times[0])

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdr_helpers.align import Motion
+from hdr_helpers.load import in_8_bits
+
 
 @dataclass(frozen=True)
 class RadianceError:
@@ -73,3 +76,25 @@ def one_photo_errors(bracket) -> list[tuple[RadianceError, RadianceError]]:
         by_curve = np.exp(np.stack([g[image[..., c]] for c, g in enumerate(crf)], axis=-1))
         errors.append((radiance_error(by_gamma, truth), radiance_error(by_curve, truth)))
     return errors
+
+
+def misplacement(bracket, alignment) -> np.ndarray:
+    """(P,) float64: how far each photograph of a virtual camera lies from where it belongs, in pixels.
+
+    bracket : with the truth of its shifts; alignment : what align_mtb found for its images
+    The larger of dx and dy, at the 90th percentile of the pixels that are neither black nor white in the photograph:
+    what it does not show can't be in the wrong place.
+    """
+    truth, count = bracket.truth, len(bracket)
+    turns = np.zeros(count) if truth.rotations is None else truth.rotations
+    hand = [Motion(*shift, degrees) for shift, degrees in zip(truth.shifts, turns, strict=True)]
+    errors = []
+    for k, image in enumerate(bracket.images):
+        gray = in_8_bits(image)[::8, ::8].mean(axis=2)
+        rows, cols = np.nonzero((gray > 8) & (gray < 247))
+        points = np.stack([cols, rows], axis=1) * 8.0 - (np.array(image.shape[1::-1]) - 1) / 2
+        points = points if len(points) else np.zeros((1, 2))
+        belongs = hand[alignment.reference].after(hand[k].inverse())(points)
+        lies = Motion(*alignment.shifts[k], alignment.rotations[k])(points)
+        errors.append(np.percentile(np.abs(lies - belongs).max(axis=1), 90))
+    return np.array(errors)
