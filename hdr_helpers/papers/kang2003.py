@@ -17,6 +17,7 @@ from hdr_helpers.papers.grossberg_nayar2003 import intensity_mapping
 
 WORK = 7.5e5  # pixels, about, of the small copies that are compared: a photograph's finest detail is noise
 TOLERANCE = 3  # grey levels by which noise, JPEG and rounding move a pixel value
+SCATTER = 2  # times the median relative deviation from the curve: a phone that lights up places by choice has more
 COLOUR = 1 / 8  # of the distance between channels: cameras mix them, so that only grey keeps to one curve a channel
 MARGIN = 1 / 250  # of the picture's shorter side: the soft contour of what moved belongs to it
 WIDE = 24  # grey levels; a reference that leaves so much open needs flow to know more
@@ -53,10 +54,10 @@ def register_locally(images, reference: int, valid=None) -> tuple[tuple, tuple]:
         # What the nearest photograph that agrees says of each pixel, as a range of values of the present one.
         low, high, told, near = small[reference], small[reference], whole[reference], reference
         for k in side:
-            lowest, highest, curves = _expected(small[near], small[k], whole[near] & whole[k])
+            lowest, highest, curves, scatter = _expected(small[near], small[k], whole[near] & whole[k])
             low, high = (cv2.LUT(bound, table) for bound, table in ((low, lowest), (high, highest)))
             low[~told], high[~told] = 0, 255
-            agrees, flow, follows = _compare(small[k], whole[k], low, high, curves)
+            agrees, flow, follows = _compare(small[k], whole[k], low, high, curves, scatter)
             values = small[k]
             if follows.any():
                 values = np.where(follows[..., None], _warp(values, flow), values)
@@ -67,15 +68,15 @@ def register_locally(images, reference: int, valid=None) -> tuple[tuple, tuple]:
     return tuple(images), tuple(masks)
 
 
-def _compare(values, valid, low, high, curves) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+def _compare(values, valid, low, high, curves, scatter) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
     """Where a photograph agrees with what is known, as it is or warped; the flow that warps it; and where that does.
 
     values : (H, W, 3) uint8; valid : (H, W) bool; low, high : (H, W, 3) uint8, the range it has to keep to
-    curves : as _expected gives them
+    curves, scatter : as _expected gives them
     """
     kernel = np.ones((3, 3), np.uint8)  # a pixel beside its place has not moved
     lowest, highest = cv2.erode(low, kernel), cv2.dilate(high, kernel)
-    moved = _whole_things(_outside(values, lowest, highest))
+    moved = _whole_things(_outside(values, lowest, highest, scatter))
     nowhere = np.zeros_like(valid)
     if np.count_nonzero(moved & valid) > MOST * np.count_nonzero(valid):
         return nowhere, None, nowhere
@@ -85,18 +86,20 @@ def _compare(values, valid, low, high, curves) -> tuple[np.ndarray, np.ndarray |
         return valid & ~moved, None, nowhere
     flow, returned = _flow(low, high, values, curves)
     warped = _warp(values, flow)
-    follows = open_ & returned & ~_outside(warped, lowest, highest) & (_warp(np.float32(valid), flow) > 0.99)
+    follows = open_ & returned & ~_outside(warped, lowest, highest, 0) & (_warp(np.float32(valid), flow) > 0.99)
     follows = cv2.morphologyEx(follows.view(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8)).view(bool)
     return (valid & ~moved) | follows, flow, follows
 
 
-def _expected(near, far, both) -> tuple[np.ndarray, np.ndarray, tuple]:
+def _expected(near, far, both) -> tuple[np.ndarray, np.ndarray, tuple, float]:
     """The lowest and the highest value that each value of near may have in far: tables (1, 256, 3) uint8.
 
     near, far : (H, W, 3) uint8; both : (H, W) bool, the pixels that count
-    And for each channel the values of far at which near is black and white.
+    And for each channel the values of far at which near is black and white; and the share of its value by which a
+    pixel may miss its range.
     """
     low, high, z = np.zeros((1, 256, 3), np.uint8), np.full((1, 256, 3), 255, np.uint8), np.arange(256)
+    scatter = 0.0
     for c in range(3 if both.any() else 0):
         joint = np.bincount(near[..., c][both].astype(np.intp) * 256 + far[..., c][both], minlength=65536)
         joint = joint.reshape(256, 256)
@@ -104,8 +107,18 @@ def _expected(near, far, both) -> tuple[np.ndarray, np.ndarray, tuple]:
         # Expected is what near leads to, and whatever leads to near: where near is white, all that is bright.
         low[0, :, c] = np.minimum(there, np.searchsorted(back, z - TOLERANCE))
         high[0, :, c] = np.ceil(np.maximum(there, np.searchsorted(back, z + TOLERANCE, "right") - 1))
+        scatter = max(scatter, SCATTER * _deviation(joint, there))
     low, high = np.maximum.accumulate(low, axis=1), np.maximum.accumulate(high, axis=1)
-    return low, high, (high[0, 0], low[0, 255])
+    return low, high, (high[0, 0], low[0, 255]), scatter
+
+
+def _deviation(joint, curve) -> float:
+    """Median relative distance of a joint histogram's pixels from a curve, where neither is black or white."""
+    inner, there = np.s_[16:240], curve[16:240, None]
+    distance = np.abs(np.arange(16, 240) - there) / np.maximum(there, 16)
+    counts, order = joint[inner, inner].ravel(), np.argsort(distance, axis=None)
+    below = np.cumsum(counts[order])
+    return float(distance.ravel()[order][np.searchsorted(below, below[-1] / 2)]) if below[-1] else 0.0
 
 
 def _median_curve(joint) -> np.ndarray:
@@ -123,12 +136,13 @@ def _median_curve(joint) -> np.ndarray:
     return by_order if apart > UNRELATED else curve
 
 
-def _outside(values, lowest, highest) -> np.ndarray:
-    """(H, W) bool: a channel is farther outside its range than noise and the mixing of colours explain."""
-    beyond = cv2.max(cv2.subtract(lowest, values), cv2.subtract(values, highest))
+def _outside(values, lowest, highest, scatter) -> np.ndarray:
+    """(H, W) bool: a channel is farther outside its range than noise, scatter and mixed colours explain."""
+    beyond = cv2.max(cv2.subtract(lowest, values), cv2.subtract(values, highest)).max(axis=2)
     r, g, b = cv2.split(values)
-    colour = cv2.subtract(cv2.max(cv2.max(r, g), b), cv2.min(cv2.min(r, g), b))
-    return np.max(beyond, axis=2) > TOLERANCE + COLOUR * colour
+    brightest = cv2.max(cv2.max(r, g), b)
+    colour = cv2.subtract(brightest, cv2.min(cv2.min(r, g), b))
+    return beyond > np.maximum(TOLERANCE + COLOUR * colour, scatter * brightest)
 
 
 def _whole_things(mask) -> np.ndarray:
