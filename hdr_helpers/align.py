@@ -14,7 +14,7 @@ from functools import partial
 import cv2
 import numpy as np
 
-from hdr_helpers._registering.blocks import View, Vote, ask_blocks, refine
+from hdr_helpers._registering.blocks import FEW, MANY, View, Vote, ask_blocks, refine
 from hdr_helpers._registering.motion import Motion, common_part, move_image
 from hdr_helpers.load import Bracket, Truth, in_8_bits
 from hdr_helpers.papers.kang2003 import register_locally
@@ -173,11 +173,15 @@ def _best_vote(fixed, moving, percentile, max_shift) -> Vote:
     """What the blocks say to the likeliest shifts of the bitmaps; the rest is not asked once most of them agree."""
     best = None
     halves = [(v.half, v.half_clear) for v in (fixed, moving)]
-    for shift in likely_shifts(*halves, percentile, -(-max_shift // 2 ** (fixed.levels + 1))):
-        vote = ask_blocks(fixed, moving, np.multiply(shift, 2))
-        if best is None or vote.chance < best.chance:
-            best = vote
-        if best.agree > best.blocks / 2 and best.chance <= MAX_CHANCE:
+    shifts = list(likely_shifts(*halves, percentile, -(-max_shift // 2 ** (fixed.levels + 1))))
+    for most in FEW, MANY:
+        for shift in shifts:
+            vote = ask_blocks(fixed, moving, np.multiply(shift, 2), most)
+            if best is None or vote.chance < best.chance:
+                best = vote
+            if best.agree > best.blocks / 2 and best.chance <= MAX_CHANCE:
+                break
+        if best.chance <= MAX_CHANCE:
             break
     return best
 

@@ -19,7 +19,7 @@ from hdr_helpers.papers.ward2003 import halved
 BLOCK = 16  # pixels across; small, so that a nearly white photograph still has some
 STEP = 12  # pixels from one block of the grid to the next
 CELL = 4  # pixels; contrast is counted in such cells, of which blocks and steps are multiples
-MOST = 64  # blocks looked for, spread over the picture
+FEW, MANY = 48, 192  # blocks looked for, spread over the picture: a few first, many where those can't agree
 CONTRAST = 3.0  # grey levels, standard deviation within a block: less is noise
 ALIKE = 0.6  # correlation from which on a block counts as found
 REACH = 8  # pixels each way that a block is looked for
@@ -29,7 +29,7 @@ BIAS = 0.05  # pixels by which neighbouring blocks can be wrong together: they s
 SURE = 0.8  # share of the blocks that leaves nothing to be found by turning
 ENOUGH = 12  # blocks from which on a turn is asked for
 FINE = 3  # pixels each way that a block is looked for at the next finer level
-FEWER = 40  # blocks are enough there: they are larger, and known to agree
+FEWER = 32  # blocks are enough there: they are larger, and known to agree
 
 
 class View:
@@ -105,11 +105,14 @@ class Vote:
     places: np.ndarray
 
 
-def ask_blocks(fixed: View, moving: View, shift) -> Vote:
-    """The vote on a guess: is moving, moved by shift = (dx, dy) pixels of the small copy, where fixed is?"""
+def ask_blocks(fixed: View, moving: View, shift, most: int = FEW) -> Vote:
+    """The vote on a guess: is moving, moved by shift = (dx, dy) pixels of the small copy, where fixed is?
+
+    most : blocks to ask at most
+    """
     unit = 2.0**fixed.levels
     guess = Motion(*np.array(shift) * unit)
-    places = _spread(fixed, moving, shift) * unit - fixed.middle
+    places = _spread(fixed, moving, shift, most) * unit - fixed.middle
     asked, found, target = _look_up(fixed, moving, places, guess, fixed.levels, REACH, BLOCK)
     best = Vote(guess, 0, asked, 1.0, 0.0, target)
     for turns, agree in ([0.0], AGREE), (TURNS, AGREE), (TURNS, 2 * AGREE):
@@ -142,7 +145,7 @@ def refine(fixed: View, moving: View, vote: Vote) -> Motion:
     return motion
 
 
-def _spread(fixed, moving, shift) -> np.ndarray:
+def _spread(fixed, moving, shift, most) -> np.ndarray:
     """Middles (n, 2) of the blocks of fixed's small copy to ask: with contrast in both pictures, and everywhere.
 
     From each eighth of the width and height first the best, then the second best, and so on.
@@ -162,7 +165,7 @@ def _spread(fixed, moving, shift) -> np.ndarray:
     order = np.lexsort((-contrast, part))
     first = np.searchsorted(part[order], part[order])
     rank = np.arange(len(order)) - first
-    order = order[np.lexsort((-contrast[order], rank))][:MOST]
+    order = order[np.lexsort((-contrast[order], rank))][:most]
     return corner[order] + BLOCK // 2
 
 

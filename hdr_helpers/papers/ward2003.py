@@ -11,6 +11,8 @@ once, by Fourier transform, not at 9: a walk that starts one pixel wrong does no
 by how far they agree beyond chance, so that a mostly white pair does not win by its white.
 """
 
+from functools import partial
+
 import cv2
 import numpy as np
 import scipy.fft
@@ -48,7 +50,7 @@ def clear_share(histograms, percentile: float) -> float:
 
 
 def likely_shifts(fixed, moving, percentile: float, max_shift: int) -> list[tuple[int, int]]:
-    """Shifts (dx, dy) of moving, in pixels right and down, at which the bitmaps of two pictures agree; best first.
+    """Shifts (dx, dy) of moving, in pixels right and down, at which the bitmaps of two pictures agree; likeliest first.
 
     fixed, moving : (gray, valid) each, (H, W) uint8; valid is 255 where a pixel counts, else 0
     max_shift : pixels each way
@@ -57,13 +59,14 @@ def likely_shifts(fixed, moving, percentile: float, max_shift: int) -> list[tupl
     while min(levels[-1][0][0].shape) >= 2 * SMALLEST:
         levels.append([halved(*picture) for picture in levels[-1]])
     pairs = [[bitmaps(gray, percentile, mask) for gray, mask in level] for level in levels]
-    shifts = _every_shift(*pairs[-1], -(-max_shift // 2 ** (len(pairs) - 1)))
-    for pair in pairs[-2::-1]:
-        near = [[(2 * x + i, 2 * y + j) for j in (0, -1, 1) for i in (0, -1, 1)] for x, y in shifts]
-        best = [min((disagreement(*pair, shift), n) for n, shift in enumerate(nine)) for nine in near]
-        order = sorted(range(len(near)), key=lambda k: best[k][0])
-        shifts = list(dict.fromkeys(near[k][best[k][1]] for k in order))
-    return shifts
+    found = []
+    for shift in _every_shift(*pairs[-1], -(-max_shift // 2 ** (len(pairs) - 1))):
+        for pair in pairs[-2::-1]:
+            x, y = 2 * shift[0], 2 * shift[1]
+            near = [(x + i, y + j) for j in (0, -1, 1) for i in (0, -1, 1)]  # of equals, the first
+            shift = min(near, key=partial(disagreement, *pair))
+        found.append(shift)
+    return list(dict.fromkeys(found))
 
 
 def disagreement(fixed, moving, shift) -> float:
