@@ -9,7 +9,7 @@ tonemap   radiance map                  ->  a picture in 0..1, (H, W, 3) float32
 
 import cv2
 
-from hdr_helpers.align import Alignment, align_mtb, crop_bracket, crop_common
+from hdr_helpers.align import Alignment, Ghosts, Match, align_mtb, crop_bracket, crop_common, remove_ghosts
 from hdr_helpers.crf import fitted_weights, gsolve, hat_weights, recover_crf, sample_pixels
 from hdr_helpers.load import Bracket, BracketError, Truth, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr
@@ -23,6 +23,8 @@ __all__ = [
     "Alignment",
     "Bracket",
     "BracketError",
+    "Ghosts",
+    "Match",
     "Truth",
     "align_mtb",
     "clipping",
@@ -35,6 +37,7 @@ __all__ = [
     "load_bracket",
     "merge_debevec",
     "recover_crf",
+    "remove_ghosts",
     "sample_pixels",
     "tonemap",
     "write_hdr",

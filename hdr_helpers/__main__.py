@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdr_helpers.align import align_mtb, crop_bracket, unaligned
+from hdr_helpers.align import align_mtb, crop_bracket, remove_ghosts, unaligned
 from hdr_helpers.crf import recover_crf
 from hdr_helpers.load import Bracket, load_bracket
 from hdr_helpers.merge import clipping, merge_debevec, write_hdr, write_whole
@@ -53,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--out", type=Path, help="folder to write to (default: BRACKET's name and _hdr)")
     parser.add_argument("--overwrite", action="store_true", help="replace results of an earlier run in OUT")
     parser.add_argument("--no-align", action="store_true", help="the photographs lie on each other already")
+    parser.add_argument("--keep-ghosts", action="store_true", help="merge all photographs even where something moved")
     parser.add_argument("--lam", type=_positive, default=20.0, help="smoothness of the curve (default: %(default)g)")
     parser.add_argument(
         "--tonemap", choices=sorted(OPERATORS), default="durand", help="operator (default: %(default)s)"
@@ -109,6 +110,13 @@ def _run(bracket: Bracket, out: Path, options) -> None:
         f"Clipped in every exposure: {shares.everywhere_bright:.3%} of the pixels are too bright in all of "
         f"them, {shares.everywhere_dark:.3%} too dark."
     )
+
+    if not options.keep_ghosts:
+        ghosts = remove_ghosts(aligned)
+        if ghosts.moved.any():
+            who, share = bracket.names[ghosts.reference], ghosts.moved.mean()
+            print(f"Something moved in {share:.2%} of the frame; there {who} says what is where.")
+        aligned = ghosts.bracket
 
     print("\nRecovering the response, merging, tone-mapping ...", flush=True)
     crf = recover_crf(aligned, lam=options.lam)

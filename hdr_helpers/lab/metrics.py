@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from hdr_helpers.align import Motion
@@ -98,3 +99,24 @@ def misplacement(bracket, alignment) -> np.ndarray:
         lies = Motion(*alignment.shifts[k], alignment.rotations[k])(points)
         errors.append(np.percentile(np.abs(lies - belongs).max(axis=1), 90))
     return np.array(errors)
+
+
+@dataclass(frozen=True)
+class MovingError:
+    """Mean absolute error of a radiance map in stops: where the scene moved, and well away from there."""
+
+    moving: float
+    still: float
+
+
+def moving_error(radiance, truth) -> MovingError:
+    """Compare a radiance map with a truth that knows what moved.
+
+    radiance : (H, W, 3) float; truth : Truth with radiance and moved
+    One scale for each channel is removed, the median over what stood still: ghosts must not hide in it.
+    """
+    near = cv2.dilate(truth.moved.view(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    with np.errstate(all="ignore"):
+        stops = np.log2(radiance) - np.log2(truth.radiance)
+    error = np.abs(stops - np.nanmedian(stops[~near], axis=0))
+    return MovingError(float(np.nanmean(error[truth.moved])), float(np.nanmean(error[~near])))

@@ -18,6 +18,7 @@ from hdr_helpers.papers.grossberg_nayar2003 import intensity_mapping
 WORK = 7.5e5  # pixels, about, of the small copies that are compared: a photograph's finest detail is noise
 TOLERANCE = 3  # grey levels by which noise, JPEG and rounding move a pixel value
 SCATTER = 2  # times the median relative deviation from the curve: a phone that lights up places by choice has more
+MOST_SCATTER = 0.4  # more is no scatter: the photographs show different things
 COLOUR = 1 / 8  # of the distance between channels: cameras mix them, so that only grey keeps to one curve a channel
 MARGIN = 1 / 250  # of the picture's shorter side: the soft contour of what moved belongs to it
 WIDE = 24  # grey levels; a reference that leaves so much open needs flow to know more
@@ -76,7 +77,7 @@ def _compare(values, valid, low, high, curves, scatter) -> tuple[np.ndarray, np.
     """
     kernel = np.ones((3, 3), np.uint8)  # a pixel beside its place has not moved
     lowest, highest = cv2.erode(low, kernel), cv2.dilate(high, kernel)
-    moved = _whole_things(_outside(values, lowest, highest, scatter))
+    moved = _whole_things(_outside(values, lowest, highest, scatter) & valid)
     nowhere = np.zeros_like(valid)
     if np.count_nonzero(moved & valid) > MOST * np.count_nonzero(valid):
         return nowhere, None, nowhere
@@ -107,7 +108,7 @@ def _expected(near, far, both) -> tuple[np.ndarray, np.ndarray, tuple, float]:
         # Expected is what near leads to, and whatever leads to near: where near is white, all that is bright.
         low[0, :, c] = np.minimum(there, np.searchsorted(back, z - TOLERANCE))
         high[0, :, c] = np.ceil(np.maximum(there, np.searchsorted(back, z + TOLERANCE, "right") - 1))
-        scatter = max(scatter, SCATTER * _deviation(joint, there))
+        scatter = max(scatter, min(SCATTER * _deviation(joint, there), MOST_SCATTER))
     low, high = np.maximum.accumulate(low, axis=1), np.maximum.accumulate(high, axis=1)
     return low, high, (high[0, 0], low[0, 255]), scatter
 
