@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from hdr_helpers._registering.blocks import FEW, MANY, View, Vote, ask_blocks, refine
+from hdr_helpers._registering.correlation import correlated_shifts
 from hdr_helpers._registering.motion import Motion, common_part, move_image
 from hdr_helpers.load import Bracket, Truth, in_8_bits
 from hdr_helpers.papers.kang2003 import register_locally
@@ -49,17 +50,19 @@ class Match:
     """How one photograph was compared with another, and how sure that is.
 
     partner : index of the photograph that it was laid on
-    percentile : at which both were thresholded; 50 is the median
+    percentile : at which both were thresholded, 50 is the median; None where only their grey values gave a guess
     agree, blocks : small blocks that tell the motion, of those looked for
     chance : bound on the probability that so many would agree by accident, 0 to 1
+    turn_known : whether the blocks tell the turn; too few in one place do not, and none is assumed
     trusted : whether that is little enough
     """
 
     partner: int
-    percentile: float
+    percentile: float | None
     agree: int
     blocks: int
     chance: float
+    turn_known: bool
     trusted: bool
 
 
@@ -72,7 +75,8 @@ class Alignment:
         where it was not turned
     rotations : (P,) float64, degrees by which each was turned counter-clockwise about its middle, before the shift
     reference : index of the photograph that stayed where it was
-    doubtful : (P,) bool, True where no match could be trusted and the photograph was moved only with its neighbour
+    doubtful : (P,) bool, True where no match could be trusted and the photograph was moved only with its neighbour;
+        and, if the hand turned, where a match does not tell the turn
     matches : tuple of P, the best Match of each photograph; None for the reference, and where there was nothing to
         compare
     """
@@ -117,6 +121,7 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
         chains = pool.map(partial(_chain, views, reference, max_shift), sides)
         found = {reference: (None, Motion()), **{k: pair for chain in chains for k, pair in chain.items()}}
         matches, motions = zip(*(found[k] for k in range(len(images))), strict=True)
+        turned = any(m.reach(shape) >= TURNED for m in motions)
         motions = [m if m.reach(shape) >= TURNED else Motion(round(m.dx), round(m.dy)) for m in motions]
         moved = tuple(pool.map(_moved, images, motions))
     return Alignment(
@@ -124,9 +129,17 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
         shifts=np.array([(m.dx, m.dy) for m in motions], dtype=np.float64),
         rotations=np.array([m.degrees for m in motions]),
         reference=reference,
-        doubtful=np.array([k != reference and not (m and m.trusted) for k, m in enumerate(matches)]),
+        doubtful=np.array([not _sure(matches, k, turned) for k in range(len(images))]),
         matches=matches,
     )
+
+
+def _sure(matches, k, turned) -> bool:
+    """Whether photograph k lies where it belongs: its match, and those of the photographs it was laid on, tell so."""
+    match = matches[k]
+    if match is None or not match.trusted:
+        return k == len(matches) // 2
+    return (match.turn_known or not turned) and _sure(matches, match.partner, turned)
 
 
 def unaligned(images) -> Alignment:
@@ -159,21 +172,30 @@ def _best_match(views, partners, k, max_shift) -> tuple[Match | None, Motion | N
     best = None
     for partner in partners:
         fixed, moving = views[partner], views[k]
-        for percentile in _percentiles(fixed.histogram, moving.histogram):
-            vote = _best_vote(fixed, moving, percentile, max_shift)
+        for percentile, shifts in _guesses(fixed, moving, max_shift):
+            vote = _best_vote(fixed, moving, shifts)
+            trusted = vote.chance <= MAX_CHANCE
+            if trusted:
+                vote = refine(fixed, moving, vote)
             if best is None or vote.chance < best.chance:
-                trusted = vote.chance <= MAX_CHANCE
-                best = Match(partner, percentile, vote.agree, vote.blocks, vote.chance, trusted)
-            if best.trusted:
-                return best, refine(fixed, moving, vote)
+                best = Match(partner, percentile, vote.agree, vote.blocks, vote.chance, vote.turn_known, trusted)
+            if trusted:
+                return best, vote.motion
     return best, None
 
 
-def _best_vote(fixed, moving, percentile, max_shift) -> Vote:
-    """What the blocks say to the likeliest shifts of the bitmaps; the rest is not asked once most of them agree."""
+def _guesses(fixed, moving, max_shift) -> Iterator[tuple[float | None, list[tuple[int, int]]]]:
+    """Percentiles, and the likeliest shifts that they give in pixels of half; at last (None) those of grey values."""
+    halves = [(view.half, view.half_clear) for view in (fixed, moving)]
+    reach = -(-max_shift // 2 ** (fixed.levels + 1))
+    for percentile in _percentiles(fixed.histogram, moving.histogram):
+        yield percentile, likely_shifts(*halves, percentile, reach)
+    yield None, correlated_shifts(*halves, reach)
+
+
+def _best_vote(fixed, moving, shifts) -> Vote:
+    """What the blocks say to some shifts, in pixels of half; the rest is not asked once most of them agree."""
     best = None
-    halves = [(v.half, v.half_clear) for v in (fixed, moving)]
-    shifts = list(likely_shifts(*halves, percentile, -(-max_shift // 2 ** (fixed.levels + 1))))
     for most in FEW, MANY:
         for shift in shifts:
             vote = ask_blocks(fixed, moving, np.multiply(shift, 2), most)

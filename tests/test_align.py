@@ -374,5 +374,6 @@ def test_a_turned_set_with_a_moving_man_is_registered(real):
     found = align_mtb(load_bracket(real("pingpong")).images)
     assert not found.doubtful.any()
     # A similarity that RANSAC finds in SIFT features: (33.7, 5.2) and 0.20 degrees, (50.4, 1.4) and 0.43 degrees.
-    np.testing.assert_allclose(found.shifts[[0, 2]], [(33.7, 5.2), (50.4, 1.4)], atol=4)
+    # Far things and near ones have moved by up to 10 pixels less and more; it is registered between them.
+    np.testing.assert_allclose(found.shifts[[0, 2]], [(33.7, 5.2), (50.4, 1.4)], atol=6)
     np.testing.assert_allclose(found.rotations[[0, 2]], (0.20, 0.43), atol=0.15)

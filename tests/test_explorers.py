@@ -4,7 +4,6 @@ import ipywidgets as widgets
 import numpy as np
 import pytest
 
-from hdr_helpers import align_mtb
 from hdr_helpers.lab import explorers
 
 
@@ -58,10 +57,13 @@ def test_the_tone_mapping_explorer_greys_out_what_the_operator_does_not_have(sma
     assert [c.disabled for c in (gamma, saturation, contrast, *of_reinhard)] == [False, True, True, False, False, False]
 
 
-def test_the_button_sets_the_sliders_to_the_shift_that_align_mtb_finds(chapel):
+def test_the_button_walks_the_sliders_to_the_shift_that_was_made(chapel, monkeypatch):
+    monkeypatch.setattr(explorers, "STEP_SECONDS", 0)
     fixed, moving = chapel.images[4], np.roll(chapel.images[5], (-3, 7), axis=(0, 1))
     explorer = explorers.align_explorer(fixed, moving)
     right, down, button = [c for c in controls(explorer) if not isinstance(c, widgets.HTML)]
+    visited = []
+    right.observe(lambda change: visited.append(change["new"]), names="value")
     button.click()
     assert (right.value, down.value) == (-7, 3)
-    assert (right.value, down.value) == tuple(align_mtb([moving, fixed]).shifts[0])
+    assert len(visited) > 1  # coarse first

@@ -222,6 +222,16 @@ def test_a_hand_held_brackets_true_error_is_measured_where_the_reference_lies(tm
     assert float(median) < 0.05
 
 
+def test_ghosts_are_taken_out_unless_they_are_to_be_kept(tmp_path, capsys):
+    errors = []
+    for options in [], ["--keep-ghosts"]:
+        assert run(data.DATA / "handheld", "-o", tmp_path / "out", "--overwrite", *options) == 0
+        printed = capsys.readouterr().out
+        assert ("there IMG_0412.jpg says what is where" in printed) == (not options)
+        errors.append(float(re.search(r"95% below ([\d.]+)\.", printed).group(1)))
+    assert errors[0] < 0.15 < errors[1] / 2
+
+
 def test_the_truth_of_other_photographs_is_refused_before_anything_is_written(save, tmp_path, chapel, capsys):
     folder = save(NAMES, TIMES)
     data.save_truth(folder, chapel.truth, 4)

@@ -6,7 +6,7 @@ a pixel, and how likely it is to be an accident: a vote, in the spirit of M. Fis
 Consensus, Communications of the ACM 24(6), 1981. Things that moved on their own are outvoted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -20,14 +20,16 @@ BLOCK = 16  # pixels across; small, so that a nearly white photograph still has 
 STEP = 12  # pixels from one block of the grid to the next
 CELL = 4  # pixels; contrast is counted in such cells, of which blocks and steps are multiples
 FEW, MANY = 48, 192  # blocks looked for, spread over the picture: a few first, many where those can't agree
-CONTRAST = 3.0  # grey levels, standard deviation within a block: less is noise
+CONTRAST = 1.0  # grey levels in the direction of least contrast: less is noise
 ALIKE = 0.6  # correlation from which on a block counts as found
 REACH = 8  # pixels each way that a block is looked for
 AGREE = 1.0  # pixels by which blocks that tell the same may differ; twice that where near and far things part
 TURNS = np.arange(-10, 11) / 5  # degrees tried; in between, and at the ends, least squares takes over
-BIAS = 0.05  # pixels by which neighbouring blocks can be wrong together: they see the same edge
+BIAS = 0.1  # pixels by which neighbouring blocks can be wrong together: they see the same edge
 SURE = 0.8  # share of the blocks that leaves nothing to be found by turning
-ENOUGH = 12  # blocks from which on a turn is asked for
+ENOUGH = 12  # blocks from which on turns are tried
+FIT = 4  # blocks from which on least squares is asked for a turn
+SETTLED = 0.25  # pixels at the corners: a turn known so well is taken as it is, a less certain one where it is large
 FINE = 3  # pixels each way that a block is looked for at the next finer level
 FEWER = 32  # blocks are enough there: they are larger, and known to agree
 
@@ -39,7 +41,7 @@ class View:
 
     small, half : grey, uint8, half is half as large again; clear, half_clear : 255 where they are valid
     histogram : (256,) counts of small's valid values
-    contrast : standard deviation of the block that starts at each CELL of small
+    contrast : of the block that starts at each CELL of small
     """
 
     def __init__(self, image, valid, levels: int):
@@ -54,15 +56,19 @@ class View:
         self.contrast = self._contrast()
 
     def _contrast(self) -> np.ndarray:
-        """Standard deviation of the BLOCK that starts at each CELL of small; 0 where not all of it is valid."""
-        height, width = (max(n // CELL, 1) * CELL for n in self.small.shape)
-        size, whole = (width // CELL, height // CELL), self.small[:height, :width]
-        square = cv2.multiply(whole, whole, dtype=cv2.CV_16U)
-        valid = self.clear[:height, :width]
-        means = [cv2.resize(a, size, interpolation=cv2.INTER_AREA).astype(np.float32) for a in (whole, square, valid)]
-        # Anchored at its first cell: the cells of a block lie to the right and below.
-        mean, square, valid = (cv2.blur(a, (BLOCK // CELL, BLOCK // CELL), anchor=(0, 0)) for a in means)
-        return np.where(valid < 255, 0, np.sqrt(np.maximum(square - mean**2, 0)))
+        """For the BLOCK that starts at each CELL of small, its contrast in the direction in which it has least.
+
+        Along an edge a block can slide without looking different, and its neighbours slide with it. Grey levels, rms
+        difference over four pixels; 0 where not all of the block is valid.
+        """
+        radius = BLOCK // 2 // 2  # in pixels of half
+        least = cv2.cornerMinEigenVal(np.float32(self.half), 2 * radius, ksize=3)
+        least[cv2.erode(self.half_clear, np.ones((2 * radius, 2 * radius), np.uint8)) == 0] = 0
+        rows, cols = (
+            np.minimum(np.arange(max(n // CELL, 1)) * CELL // 2 + radius, m - 1)
+            for n, m in zip(self.small.shape, least.shape, strict=True)
+        )
+        return np.sqrt(np.maximum(least[np.ix_(rows, cols)], 0))
 
     @staticmethod
     def _reduced(pixels, levels) -> np.ndarray:
@@ -93,6 +99,7 @@ class Vote:
     motion : of the moving picture onto the fixed one, in pixels of the full picture
     agree, blocks : how many blocks say so, of how many that were looked for
     chance : bound on the probability that so many would agree by accident
+    turn_known : whether they tell the turn; if not, none is assumed
     within : pixels of the full picture by which they differ at most
     places : (N, 2), where the blocks that agree lie in the fixed picture, from its middle
     """
@@ -101,6 +108,7 @@ class Vote:
     agree: int
     blocks: int
     chance: float
+    turn_known: bool
     within: float
     places: np.ndarray
 
@@ -112,9 +120,9 @@ def ask_blocks(fixed: View, moving: View, shift, most: int = FEW) -> Vote:
     """
     unit = 2.0**fixed.levels
     guess = Motion(*np.array(shift) * unit)
-    places = _spread(fixed, moving, shift, most) * unit - fixed.middle
-    asked, found, target = _look_up(fixed, moving, places, guess, fixed.levels, REACH, BLOCK)
-    best = Vote(guess, 0, asked, 1.0, 0.0, target)
+    places = spread(fixed, moving, shift, most) * unit - fixed.middle
+    asked, found, target = look_up(fixed, moving, places, guess, fixed.levels, REACH, BLOCK)
+    best = Vote(guess, 0, asked, 1.0, False, 0.0, target)
     for turns, agree in ([0.0], AGREE), (TURNS, AGREE), (TURNS, 2 * AGREE):
         if len(found) < (2 if len(turns) == 1 else ENOUGH) or best.agree > SURE * asked:
             break
@@ -124,28 +132,28 @@ def ask_blocks(fixed: View, moving: View, shift, most: int = FEW) -> Vote:
         one = (2 * agree + 1) ** 2 / places
         chance = min(1.0, len(turns) * places / 9 * float(binom.sf(near.sum() - 1, asked, one)))
         if chance < best.chance:
-            motion = _settled(found[near], target[near], unit)
-            best = Vote(motion, int(near.sum()), asked, chance, agree * unit, target[near])
+            motion, known = _settled(found[near], target[near], unit, fixed)
+            best = Vote(motion, int(near.sum()), asked, chance, known, agree * unit, target[near])
     return best
 
 
-def refine(fixed: View, moving: View, vote: Vote) -> Motion:
-    """The motion of a vote to a fraction of a pixel: its blocks are looked up again at ever finer levels."""
-    motion = vote.motion
+def refine(fixed: View, moving: View, vote: Vote) -> Vote:
+    """The same vote with its motion to a fraction of a pixel: its blocks are looked up again at ever finer levels."""
+    motion, known = vote.motion, vote.turn_known
     for level in range(max(fixed.levels - 1, 0), -1, -1):
         unit = 2**level
-        asked, found, target = _look_up(fixed, moving, vote.places[:FEWER], motion, level, FINE, 2 * BLOCK)
+        asked, found, target = look_up(fixed, moving, vote.places[:FEWER], motion, level, FINE, 2 * BLOCK)
         off = target - motion(found)
         # Near and far things part by as much at every level; the blocks' own error shrinks with it.
         limit = AGREE * unit if vote.within <= AGREE * 2**fixed.levels else vote.within
         near = np.abs(off - np.median(off, axis=0)).max(axis=1) <= limit if len(off) else np.zeros(0, dtype=bool)
         if near.sum() < max(2, asked / 3):
             break  # too noisy from here on: the coarser answer stands
-        motion = _settled(found[near], target[near], unit)
-    return motion
+        motion, known = _settled(found[near], target[near], unit, fixed)
+    return replace(vote, motion=motion, turn_known=known)
 
 
-def _spread(fixed, moving, shift, most) -> np.ndarray:
+def spread(fixed, moving, shift, most) -> np.ndarray:
     """Middles (n, 2) of the blocks of fixed's small copy to ask: with contrast in both pictures, and everywhere.
 
     From each eighth of the width and height first the best, then the second best, and so on.
@@ -169,7 +177,7 @@ def _spread(fixed, moving, shift, most) -> np.ndarray:
     return corner[order] + BLOCK // 2
 
 
-def _look_up(fixed, moving, places, motion, level, reach, size) -> tuple[int, np.ndarray, np.ndarray]:
+def look_up(fixed, moving, places, motion, level, reach, size) -> tuple[int, np.ndarray, np.ndarray]:
     """Look for blocks of fixed in moving, where motion says that they are and up to reach pixels round it.
 
     places : (N, 2) in fixed, pixels of the full picture from its middle
@@ -226,9 +234,11 @@ def _largest_agreement(found, target, turns, tolerance) -> np.ndarray:
     return near[np.unravel_index(most.argmax(), most.shape)]
 
 
-def _settled(found, target, unit) -> Motion:
-    """The motion of blocks that agree; with a turn only where that moves them by clearly more than their error."""
-    motion, error = fit_motion(found, target, BIAS * unit)
-    if len(found) >= ENOUGH and abs(motion.degrees) > 3 * error:
-        return motion
-    return Motion(*np.mean(target - found, axis=0))
+def _settled(found, target, unit, view) -> tuple[Motion, bool]:
+    """The motion of blocks that agree, and whether they tell the turn; where they do not, none is assumed."""
+    if len(found) >= FIT:
+        motion, error = fit_motion(found, target, BIAS * unit)
+        corners = Motion(degrees=error).reach(view.image.shape)
+        if corners < SETTLED * unit or abs(motion.degrees) > 3 * error:
+            return motion, True
+    return Motion(*np.mean(target - found, axis=0)), False

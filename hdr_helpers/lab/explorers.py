@@ -3,11 +3,13 @@
 Every explorer draws into one Image widget, so nothing stacks up or flickers when a slider moves.
 """
 
+import time
+
 import cv2
 import ipywidgets as widgets
 import numpy as np
 
-from hdr_helpers.align import align_mtb, bitmaps
+from hdr_helpers.align import bitmaps
 from hdr_helpers.crf import fitted_weights, gsolve, sample_pixels
 from hdr_helpers.lab.figures import (
     data_on_curve_figure,
@@ -18,9 +20,11 @@ from hdr_helpers.lab.figures import (
     viewed_at,
 )
 from hdr_helpers.lab.metrics import crf_rmse
+from hdr_helpers.papers.ward2003 import disagreement
 from hdr_helpers.tonemap import OPERATORS, expose_for_screen, tonemap
 
 PREVIEW = 640  # pixels across in explorers that compute while a slider moves
+STEP_SECONDS = 0.5  # between the steps of what an explorer shows step by step
 CONTROL = {"style": {"description_width": "190px"}, "layout": {"width": "560px"}}
 
 
@@ -52,22 +56,45 @@ def exposure_explorer(bracket):
 
 
 def align_explorer(fixed, moving, reach=24):
-    """Align two photographs, (H, W, 3) uint8, by hand: bring the coloured pixels of their bitmaps to vanish."""
-    fixed_bits, moving_bits = (bitmaps(cv2.cvtColor(i, cv2.COLOR_RGB2GRAY)) for i in (fixed, moving))
+    """Align two photographs, (H, W, 3) uint8, by hand: bring the coloured pixels of their bitmaps to vanish.
+
+    A button lets MTB do it, from the smallest level of the pyramid to the largest, the sliders going along.
+    """
+    grays = [cv2.cvtColor(i, cv2.COLOR_RGB2GRAY) for i in (fixed, moving)]
+    pair = [bitmaps(gray) for gray in grays]
     right = widgets.IntSlider(0, -reach, reach, description="right (px)", **CONTROL)
     down = widgets.IntSlider(0, -reach, reach, description="down (px)", **CONTROL)
-    button = widgets.Button(description="Let MTB do it", tooltip="set both sliders to the shift that MTB finds")
+    button = widgets.Button(description="Let MTB do it", tooltip="search from the coarsest level to the finest")
 
     def draw(dx, dy):
-        picture = hand_figure(fixed_bits, moving_bits, (dx, dy))
+        picture = hand_figure(*pair, (dx, dy))
         coloured = (picture[..., 0] != picture[..., 2]).mean()
         return jpeg_bytes(picture), f"<b>{coloured:.2%}</b> of the pixels disagree at ({dx:+d}, {dy:+d})"
 
     def solve(_):
-        right.value, down.value = (round(s) for s in align_mtb([moving, fixed]).shifts[0])
+        right.value = down.value = 0
+        for dx, dy in pyramid_walk(*grays, reach):
+            time.sleep(STEP_SECONDS)
+            right.value, down.value = dx, dy
 
     button.on_click(solve)
     return _explorer(draw, {"dx": right, "dy": down}, [button])
+
+
+def pyramid_walk(fixed, moving, reach) -> list[tuple[int, int]]:
+    """The shift of moving, (dx, dy) in pixels of the full picture, that MTB holds after each level of its pyramid.
+
+    fixed, moving : (H, W) uint8; reach : pixels each way that the coarsest level looks
+    """
+    levels = max(1, int(np.log2(reach)))
+    shift, steps = (0, 0), []
+    for level in reversed(range(levels)):
+        size = fixed.shape[1] >> level, fixed.shape[0] >> level
+        pair = [bitmaps(cv2.resize(gray, size, interpolation=cv2.INTER_AREA)) for gray in (fixed, moving)]
+        near = [(2 * shift[0] + i, 2 * shift[1] + j) for j in (0, -1, 1) for i in (0, -1, 1)]
+        shift = min(near, key=lambda s, pair=pair: disagreement(*pair, s))
+        steps.append((shift[0] << level, shift[1] << level))
+    return steps
 
 
 def crf_explorer(bracket, channel=1):

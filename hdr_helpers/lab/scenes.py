@@ -46,7 +46,7 @@ def _storable(radiance) -> np.ndarray:
     return (radiance / STORED_SCALE).astype(np.float16).astype(np.float32) * STORED_SCALE
 
 
-def random_scene(seed: int, shape=(512, 768), stops: float = 17.0) -> np.ndarray:
+def random_scene(seed: int, shape=(512, 768), stops: float = 18.5) -> np.ndarray:
     """A scene that nobody has seen: texture, light that falls off, patches in light and shade, lamps, colours.
 
     shape : rows and columns

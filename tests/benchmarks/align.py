@@ -24,12 +24,12 @@ from hdr_helpers import align_mtb, load_bracket
 from hdr_helpers.align import unaligned
 from hdr_helpers.lab.metrics import misplacement
 
-KINDS = (  # exposures, largest shift, largest turn
-    (SIXTEEN, 20, 0.0),
-    (SIXTEEN, 50, 0.0),
-    (SIXTEEN, 20, 0.5),
-    (FOUR, 20, 0.0),
-    (FOUR, 20, 0.5),
+KINDS = (  # exposures, largest shift, largest turn, rows and columns
+    (FOUR, 20, 0.0, (384, 512)),
+    (SIXTEEN, 20, 0.0, (384, 512)),
+    (SIXTEEN, 50, 0.0, (512, 768)),
+    (SIXTEEN, 20, 0.5, (384, 512)),
+    (FOUR, 20, 0.5, (384, 512)),
 )
 
 
@@ -54,11 +54,11 @@ def chained_by_opencv(images):
 
 
 def truth(count: int) -> None:
-    print(f"{count} brackets of each kind, 512 x 384. Off: more than 1 pixel from where it belongs.")
-    for times, reach, turn in KINDS:
+    print(f"{count} brackets of each kind. Off: more than 1 pixel from where it belongs.")
+    for times, reach, turn, size in KINDS:
         started, off, silent, doubtful, brackets, others = time.perf_counter(), 0, 0, 0, 0, np.zeros(2)
         for seed in range(1000, 1000 + count):
-            bracket = random_bracket(seed, times, reach, turn)
+            bracket = random_bracket(seed, times, reach, turn, size)
             found = align_mtb(bracket.images)
             wrong = misplacement(bracket, found) > 1
             off, silent = off + wrong.sum(), silent + (wrong & ~found.doubtful).sum()

@@ -3,7 +3,15 @@
 Functions named *_figure return a matplotlib Figure; show() puts one into a notebook with its alt text.
 """
 
-from hdr_helpers.lab.figures.align import bitmaps_figure, detail_figure, hand_figure, shifts_figure
+from hdr_helpers.lab.figures.align import (
+    bitmaps_figure,
+    detail_figure,
+    ghost_map_figure,
+    hand_figure,
+    percentiles_figure,
+    shifts_figure,
+    vote_figure,
+)
 from hdr_helpers.lab.figures.crf import (
     crf_error_figure,
     crf_figure,
@@ -46,6 +54,7 @@ __all__ = [
     "eight_bits_figure",
     "error_figure",
     "false_colour_figure",
+    "ghost_map_figure",
     "hand_figure",
     "histogram_figure",
     "honest_figure",
@@ -53,6 +62,7 @@ __all__ = [
     "jpeg_bytes",
     "matrix_figure",
     "one_photo_figure",
+    "percentiles_figure",
     "pictures_figure",
     "pixel_estimates_figure",
     "pixel_figure",
@@ -65,4 +75,5 @@ __all__ = [
     "transfer_figure",
     "usable_share",
     "viewed_at",
+    "vote_figure",
 ]
