@@ -57,13 +57,14 @@ def test_the_tone_mapping_explorer_greys_out_what_the_operator_does_not_have(sma
     assert [c.disabled for c in (gamma, saturation, contrast, *of_reinhard)] == [False, True, True, False, False, False]
 
 
-def test_the_button_walks_the_sliders_to_the_shift_that_was_made(chapel, monkeypatch):
+@pytest.mark.parametrize("shift", [(-7, 3), (23, -17)])
+def test_the_button_walks_the_sliders_to_the_shift_that_was_made(chapel, monkeypatch, shift):
     monkeypatch.setattr(explorers, "STEP_SECONDS", 0)
-    fixed, moving = chapel.images[4], np.roll(chapel.images[5], (-3, 7), axis=(0, 1))
+    fixed, moving = chapel.images[4], np.roll(chapel.images[5], (-shift[1], -shift[0]), axis=(0, 1))
     explorer = explorers.align_explorer(fixed, moving)
     right, down, button = [c for c in controls(explorer) if not isinstance(c, widgets.HTML)]
     visited = []
     right.observe(lambda change: visited.append(change["new"]), names="value")
     button.click()
-    assert (right.value, down.value) == (-7, 3)
+    assert (right.value, down.value) == shift
     assert len(visited) > 1  # coarse first

@@ -84,9 +84,9 @@ def align_explorer(fixed, moving, reach=24):
 def pyramid_walk(fixed, moving, reach) -> list[tuple[int, int]]:
     """The shift of moving, (dx, dy) in pixels of the full picture, that MTB holds after each level of its pyramid.
 
-    fixed, moving : (H, W) uint8; reach : pixels each way that the coarsest level looks
+    fixed, moving : (H, W) uint8; reach : the largest shift looked for, pixels each way
     """
-    levels = max(1, int(np.log2(reach)))
+    levels = int(np.ceil(np.log2(reach + 1)))  # a pixel each way at every level adds up to reach
     shift, steps = (0, 0), []
     for level in reversed(range(levels)):
         size = fixed.shape[1] >> level, fixed.shape[0] >> level
