@@ -100,12 +100,10 @@ def _run(bracket: Bracket, out: Path, options) -> None:
     shares = clipping(aligned.images, aligned.valid)
     print(f"\n{'photograph':24} {'time (s)':>10} {'moved by (px, degrees)':>23} {'too dark':>9} {'too bright':>11}")
     motions = [_spelled(*s, r) for s, r in zip(alignment.shifts, alignment.rotations, strict=True)]
-    rows = zip(
-        bracket.names, bracket.times, motions, shares.too_dark, shares.too_bright, alignment.doubtful, strict=True
-    )
+    doubts = [alignment.doubt(k) for k in range(len(bracket))]
+    rows = zip(bracket.names, bracket.times, motions, shares.too_dark, shares.too_bright, doubts, strict=True)
     for name, seconds, motion, dark, bright, doubt in rows:
-        mark = "  not sure where it lies; left beside its neighbour" if doubt else ""
-        print(f"{name:24} {seconds:10.6g} {motion:>23} {dark:9.2%} {bright:11.2%}{mark}")
+        print(f"{name:24} {seconds:10.6g} {motion:>23} {dark:9.2%} {bright:11.2%}{'  ' * bool(doubt)}{doubt}")
     print(
         f"Clipped in every exposure: {shares.everywhere_bright:.3%} of the pixels are too bright in all of "
         f"them, {shares.everywhere_dark:.3%} too dark."

@@ -6,7 +6,6 @@ it can't be an accident is a photograph moved. They also tell a small turn of th
 reported, and left beside its neighbour.
 """
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,12 +13,12 @@ from functools import partial
 import cv2
 import numpy as np
 
-from hdr_helpers._registering.blocks import FEW, MANY, View, Vote, ask_blocks, refine
-from hdr_helpers._registering.correlation import correlated_shifts
+from hdr_helpers._registering.blocks import View
+from hdr_helpers._registering.matching import Match, match_chain
 from hdr_helpers._registering.motion import Motion, common_part, move_image
 from hdr_helpers.load import Bracket, Truth, in_8_bits
 from hdr_helpers.papers.kang2003 import register_locally
-from hdr_helpers.papers.ward2003 import PERCENTILES, bitmaps, clear_share, likely_shifts
+from hdr_helpers.papers.ward2003 import bitmaps
 
 __all__ = [
     "Alignment",
@@ -36,34 +35,9 @@ __all__ = [
 ]
 
 WORK = 384  # pixels across, at least, of the small copies on which photographs are compared
-CLEAR = 0.225  # share of the pixels on each side of the median, off it in both frames, from which on it is trusted
-MORE = 2  # other percentiles tried where the median is not enough
-PARTNERS = 3  # neighbours, next first, with which a photograph is compared
-MAX_CHANCE = 1e-4  # a match is trusted if blocks would agree like this by accident less often
 TURNED = 0.5  # pixels by which a turn moves the corners; less is no turn
 GLANCE = 2e5  # pixels that are enough to see what moves
 DARK, BRIGHT = 5, 250  # grey levels within which a photograph shows something
-
-
-@dataclass(frozen=True)
-class Match:
-    """How one photograph was compared with another, and how sure that is.
-
-    partner : index of the photograph that it was laid on
-    percentile : at which both were thresholded, 50 is the median; None where only their grey values gave a guess
-    agree, blocks : small blocks that tell the motion, of those looked for
-    chance : bound on the probability that so many would agree by accident, 0 to 1
-    turn_known : whether the blocks tell the turn; too few in one place do not, and none is assumed
-    trusted : whether that is little enough
-    """
-
-    partner: int
-    percentile: float | None
-    agree: int
-    blocks: int
-    chance: float
-    turn_known: bool
-    trusted: bool
 
 
 @dataclass(frozen=True)
@@ -88,6 +62,17 @@ class Alignment:
     doubtful: np.ndarray
     matches: tuple[Match | None, ...]
 
+    def doubt(self, k: int) -> str:
+        """Why photograph k is doubtful, for people; empty where it is not."""
+        match = self.matches[k]
+        if not self.doubtful[k]:
+            return ""
+        if match is None:
+            return "shows nothing to align; moved like its neighbour"
+        if not match.trusted:
+            return f"only {match.agree} of {match.blocks} blocks agree; moved like its neighbour"
+        return "it can't be told how far the hand turned"
+
 
 def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
     """Move the photographs of a bracket onto the middle one.
@@ -100,11 +85,15 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
     Each photograph is compared with its neighbour in exposure, which looks most like it, or with the next but one;
     the motions are added up along the chain. Where the hand did not turn, photographs are moved by whole pixels and
     keep their values; where it did, they are interpolated.
-    Raises ValueError for fewer than two photographs, photographs of different sizes, or a max_shift below 1.
+    Raises ValueError for fewer than two photographs, photographs of different or unknown form, masks that do not fit
+    them, or a max_shift below 1.
     """
     images = tuple(images)
     if len(images) < 2:
         raise ValueError(f"Aligning needs at least two photographs; got {len(images)}.")
+    for image in images:
+        if image.dtype not in (np.uint8, np.uint16) or image.shape[2:] != (3,):
+            raise ValueError(f"Photographs must be (H, W, 3), uint8 or uint16; got {image.dtype} {image.shape}.")
     if len({image.shape[:2] for image in images}) > 1:
         sizes = sorted({f"{i.shape[1]} x {i.shape[0]}" for i in images})
         raise ValueError(f"All photographs must have the same size; got {' and '.join(sizes)}.")
@@ -112,13 +101,15 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
     max_shift = max(min(shape[:2]) // 4, 1) if max_shift is None else max_shift
     if max_shift < 1:
         raise ValueError(f"max_shift must be at least 1 pixel; got {max_shift}.")
+    if valid is not None and [np.shape(mask) for mask in valid] != [image.shape[:2] for image in images]:
+        raise ValueError(f"valid must hold one mask of {shape[:2]} for each photograph.")
 
     levels = max(0, int(np.log2(max(min(shape[:2]) / WORK, 1))))
     reference = len(images) // 2
     sides = range(reference + 1, len(images)), range(reference - 1, -1, -1)
     with ThreadPoolExecutor() as pool:  # OpenCV and NumPy work side by side
         views = list(pool.map(partial(View, levels=levels), images, valid or [None] * len(images)))
-        chains = pool.map(partial(_chain, views, reference, max_shift), sides)
+        chains = pool.map(partial(match_chain, views, reference, max_shift), sides)
         found = {reference: (None, Motion()), **{k: pair for chain in chains for k, pair in chain.items()}}
         matches, motions = zip(*(found[k] for k in range(len(images))), strict=True)
         turned = any(m.reach(shape) >= TURNED for m in motions)
@@ -142,79 +133,15 @@ def _sure(matches, k, turned) -> bool:
     return (match.turn_known or not turned) and _sure(matches, match.partner, turned)
 
 
+def _moved(image, motion: Motion) -> np.ndarray:
+    return image if motion == Motion() else move_image(image, (motion.dx, motion.dy), motion.degrees)
+
+
 def unaligned(images) -> Alignment:
     """The Alignment of P photographs that lie on each other already: nothing is moved, nothing is doubtful."""
     count = len(images)
     still = np.zeros((count, 2)), np.zeros(count)
     return Alignment(tuple(images), *still, count // 2, np.zeros(count, dtype=bool), (None,) * count)
-
-
-def _moved(image, motion: Motion) -> np.ndarray:
-    return image if motion == Motion() else move_image(image, (motion.dx, motion.dy), motion.degrees)
-
-
-def _chain(views, reference, max_shift, side) -> dict[int, tuple[Match | None, Motion]]:
-    """The photographs of one side, nearest to the reference first: how each was matched, and its whole motion."""
-    found = {reference: (None, Motion())}
-    known = [reference]  # the photographs whose place is sure, last one last
-    for k in side:
-        match, motion = _best_match(views, known[: -PARTNERS - 1 : -1], k, max_shift)
-        if match is not None and match.trusted:
-            found[k] = match, found[match.partner][1].after(motion)
-            known.append(k)
-        else:
-            found[k] = match, found[known[-1]][1]
-    return found
-
-
-def _best_match(views, partners, k, max_shift) -> tuple[Match | None, Motion | None]:
-    """The first match of photograph k with one of its partners that can be trusted, else the least doubtful one."""
-    best = None
-    for partner in partners:
-        fixed, moving = views[partner], views[k]
-        for percentile, shifts in _guesses(fixed, moving, max_shift):
-            vote = _best_vote(fixed, moving, shifts)
-            trusted = vote.chance <= MAX_CHANCE
-            if trusted:
-                vote = refine(fixed, moving, vote)
-            if best is None or vote.chance < best.chance:
-                best = Match(partner, percentile, vote.agree, vote.blocks, vote.chance, vote.turn_known, trusted)
-            if trusted:
-                return best, vote.motion
-    return best, None
-
-
-def _guesses(fixed, moving, max_shift) -> Iterator[tuple[float | None, list[tuple[int, int]]]]:
-    """Percentiles, and the likeliest shifts that they give in pixels of half; at last (None) those of grey values."""
-    halves = [(view.half, view.half_clear) for view in (fixed, moving)]
-    reach = -(-max_shift // 2 ** (fixed.levels + 1))
-    for percentile in _percentiles(fixed.histogram, moving.histogram):
-        yield percentile, likely_shifts(*halves, percentile, reach)
-    yield None, correlated_shifts(*halves, reach)
-
-
-def _best_vote(fixed, moving, shifts) -> Vote:
-    """What the blocks say to some shifts, in pixels of half; the rest is not asked once most of them agree."""
-    best = None
-    for most in FEW, MANY:
-        for shift in shifts:
-            vote = ask_blocks(fixed, moving, np.multiply(shift, 2), most)
-            if best is None or vote.chance < best.chance:
-                best = vote
-            if best.agree > best.blocks / 2 and best.chance <= MAX_CHANCE:
-                break
-        if best.chance <= MAX_CHANCE:
-            break
-    return best
-
-
-def _percentiles(*histograms) -> Iterator[float]:
-    """Those worth trying on two pictures: the median where it splits both well, then what splits them best."""
-    median = clear_share(histograms, 50) >= CLEAR
-    if median:
-        yield 50
-    shares = {p: clear_share(histograms, p) for p in PERCENTILES if not (median and p == 50)}
-    yield from sorted((p for p in shares if shares[p] > 0), key=lambda p: -shares[p])[:MORE]
 
 
 def crop_common(images, shifts, rotations=None) -> tuple[np.ndarray, ...]:

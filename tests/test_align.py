@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hdr_helpers._registering.correlation import correlated_shifts
 from hdr_helpers._registering.motion import common_part, fit_motion
 from hdr_helpers.align import Motion, align_mtb, bitmaps, crop_bracket, crop_common, move_image
 from hdr_helpers.lab.brackets import CHAPEL_TIMES, HANDHELD_ROTATIONS, HANDHELD_SHIFTS
@@ -101,6 +102,8 @@ def test_a_photograph_that_is_lost_does_not_break_the_chain():
     others = [0, 1, 2, 3, 4, 6]
     assert np.array_equal(found.shifts[others], (moves[3] - moves)[others])
     assert np.array_equal(found.shifts[5], found.shifts[4])  # left beside its neighbour, not guessed
+    assert "blocks agree" in found.doubt(5)
+    assert not any(found.doubt(k) for k in others)
 
 
 def test_every_match_says_how_sure_it_is():
@@ -112,6 +115,18 @@ def test_every_match_says_how_sure_it_is():
             assert match.trusted == (not found.doubtful[k]) == (match.chance <= 1e-4)
             assert 0 <= match.agree <= match.blocks
     assert {match.percentile for match in found.matches if match} > {50}  # the median does not always do
+
+
+def test_a_turn_that_a_photograph_can_not_tell_makes_it_doubtful_if_the_hand_turned_and_only_then():
+    untold = {}
+    for turn in 0.0, 0.5:
+        found = align_mtb(random_bracket(2, SIXTEEN, 15, turn).images)
+        assert bool(found.rotations.any()) == bool(turn)
+        told = [match is None or match.turn_known or not match.trusted for match in found.matches]
+        untold[turn] = np.flatnonzero(np.logical_not(told))
+        assert np.all(found.doubtful[untold[turn]] == bool(turn))
+        assert all(("turn" in found.doubt(k)) == bool(turn) for k in untold[turn])
+    assert all(len(which) for which in untold.values())  # there are such photographs, nearly white ones
 
 
 def test_pictures_of_different_scenes_are_never_believed_to_lie_on_each_other():
@@ -209,6 +224,19 @@ def test_aligning_refuses_a_single_photograph(small_bracket):
 def test_aligning_refuses_to_look_nowhere(small_bracket, max_shift):
     with pytest.raises(ValueError, match="at least 1 pixel"):
         align_mtb(small_bracket.images, max_shift=max_shift)
+
+
+@pytest.mark.parametrize(
+    "image", [np.zeros((40, 50), np.uint8), np.zeros((40, 50, 3)), np.zeros((40, 50, 4), np.uint8)]
+)
+def test_aligning_refuses_what_is_no_photograph(image):
+    with pytest.raises(ValueError, match=r"must be \(H, W, 3\), uint8 or uint16; got"):
+        align_mtb([image, image])
+
+
+def test_aligning_refuses_masks_that_do_not_fit(small_bracket):
+    with pytest.raises(ValueError, match="one mask of"):
+        align_mtb(small_bracket.images, valid=[np.ones((3, 3), bool)] * len(small_bracket))
 
 
 def test_aligning_refuses_different_sizes(small_bracket):
@@ -324,6 +352,19 @@ def test_the_shift_with_the_least_xor_is_found_among_all(chapel):
     pair = bitmaps(gray), bitmaps(moving)
     every = {(dx, dy): disagreement(*pair, (dx, dy)) for dx in range(-12, 13) for dy in range(-12, 13)}
     assert best == min(every, key=every.get) == (7, -4)
+
+
+def test_grey_values_guess_a_shift_though_half_of_what_is_to_see_has_left_the_frame():
+    scene = np.full((200, 260), 255, np.uint8)
+    for x, y in ((60, 50), (120, 90), (215, 60), (230, 170), (190, 140)):
+        cv2.circle(scene, (x, y), 9, 90, -1)
+    scene = cv2.GaussianBlur(scene, (0, 0), 3)
+    fixed, moving = scene[30:150, 20:180], scene[22:142, 55:215]
+    everywhere = np.full(fixed.shape, 255, np.uint8)
+    for picture in (1, -1):  # dark spots on white, and lamps in the dark
+        grays = [fixed, moving] if picture == 1 else [255 - fixed, 255 - moving]
+        best, *_ = correlated_shifts(*((gray, everywhere) for gray in grays), 60)
+        assert best == (35, -8)
 
 
 def test_bitmaps_of_unrelated_pictures_disagree_as_chance_would():

@@ -2,7 +2,7 @@
 
     python -m hdr_helpers.lab.brackets [FOLDER]
 
-makes data/chapel and data/handheld from data/scenes; the same bytes every time.
+makes data/chapel and data/handheld from data/scenes; the same bytes every time on one kind of processor.
 """
 
 import argparse
