@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hdr_helpers.papers.ward2003 import overlap
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -61,8 +63,8 @@ def move_image(image, shift, degrees: float = 0.0) -> np.ndarray:
 
     degrees : counter-clockwise turn about the middle of the image, before the shift
 
-    Whole pixels without a turn are moved as they are, everything else is interpolated (bicubic; masks of bool or
-    of 0 and 255 come out True or 255 only where no pixel from outside has a part).
+    Whole pixels without a turn are moved as they are, everything else is interpolated, bicubic; a mask of bool comes
+    out True only where nothing but True has a part.
     The empty border holds no measurement: 0 has no weight in the merge, and crop_common cuts it off.
     (np.roll would bring in the opposite edge instead.)
     """
@@ -86,17 +88,6 @@ def move_image(image, shift, degrees: float = 0.0) -> np.ndarray:
     moved = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     moved[inside < 255] = 0
     return moved
-
-
-def overlap(shape, shift) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Where two arrays of one shape lie on each other when the second is moved by (dx, dy) whole pixels.
-
-    Returns the rows and columns of the first, and those of the second.
-    """
-    (height, width), (dx, dy) = shape, shift
-    here = np.s_[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]
-    there = np.s_[max(-dy, 0) : height + min(-dy, 0), max(-dx, 0) : width + min(-dx, 0)]
-    return here, there
 
 
 def common_part(shape, shifts, rotations) -> tuple[slice, slice]:

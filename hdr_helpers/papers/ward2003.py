@@ -77,8 +77,7 @@ def disagreement(fixed, moving, shift) -> float:
     (height, width), (dx, dy) = fixed[0].shape, shift
     if abs(dx) >= width or abs(dy) >= height:
         return 1.0
-    here = np.s_[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]
-    there = np.s_[max(-dy, 0) : height + min(-dy, 0), max(-dx, 0) : width + min(-dx, 0)]
+    here, there = overlap((height, width), shift)
     clear = cv2.bitwise_and(fixed[1][here], moving[1][there])
     a, b = (cv2.bitwise_and(bits, clear) for bits in (fixed[0][here], moving[0][there]))
     # Shares, not counts: the overlap shrinks as the shift grows.
@@ -95,6 +94,17 @@ def halved(gray, valid) -> tuple[np.ndarray, np.ndarray]:
     size = max(gray.shape[1] // 2, 1), max(gray.shape[0] // 2, 1)
     small, whole = (cv2.resize(a, size, interpolation=cv2.INTER_AREA) for a in (gray, valid))
     return small, cv2.threshold(whole, 254, 255, cv2.THRESH_BINARY)[1]
+
+
+def overlap(shape, shift) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Where two arrays of one shape lie on each other when the second is moved by (dx, dy) whole pixels.
+
+    Returns the rows and columns of the first, and those of the second.
+    """
+    (height, width), (dx, dy) = shape, shift
+    here = np.s_[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]
+    there = np.s_[max(-dy, 0) : height + min(-dy, 0), max(-dx, 0) : width + min(-dx, 0)]
+    return here, there
 
 
 def _threshold(histogram, percentile) -> int:
