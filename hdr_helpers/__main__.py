@@ -113,7 +113,9 @@ def _run(bracket: Bracket, out: Path, options) -> None:
         ghosts = remove_ghosts(aligned)
         if ghosts.moved.any():
             who, share = bracket.names[ghosts.reference], ghosts.moved.mean()
-            print(f"Something moved in {share:.2%} of the frame; there {who} says what is where.")
+            print(
+                f"In {share:.2%} of the frame the photographs disagree, as where something moved; there {who} decides."
+            )
         aligned = ghosts.bracket
 
     print("\nRecovering the response, merging, tone-mapping ...", flush=True)
