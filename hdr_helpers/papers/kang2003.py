@@ -82,7 +82,7 @@ def _compare(values, valid, low, high, curves, scatter) -> tuple[np.ndarray, np.
     if np.count_nonzero(moved & valid) > MOST * np.count_nonzero(valid):
         return nowhere, None, nowhere
     # Where the reference tells enough it is better alone than with what was warped, however well.
-    open_ = moved & (cv2.subtract(high, low).max(axis=2) > WIDE)
+    open_ = moved & (_largest(cv2.subtract(high, low)) > WIDE)
     if not cv2.erode(open_.view(np.uint8), np.ones((9, 9), np.uint8)).any() or min(valid.shape) < 16:
         return valid & ~moved, None, nowhere
     flow, returned = _flow(low, high, values, curves)
@@ -139,11 +139,16 @@ def _median_curve(joint) -> np.ndarray:
 
 def _outside(values, lowest, highest, scatter) -> np.ndarray:
     """(H, W) bool: a channel is farther outside its range than noise, scatter and mixed colours explain."""
-    beyond = cv2.max(cv2.subtract(lowest, values), cv2.subtract(values, highest)).max(axis=2)
-    r, g, b = cv2.split(values)
-    brightest = cv2.max(cv2.max(r, g), b)
-    colour = cv2.subtract(brightest, cv2.min(cv2.min(r, g), b))
+    beyond = _largest(cv2.max(cv2.subtract(lowest, values), cv2.subtract(values, highest)))
+    brightest = _largest(values)
+    colour = cv2.subtract(brightest, cv2.bitwise_not(_largest(cv2.bitwise_not(values))))
     return beyond > np.maximum(TOLERANCE + COLOUR * colour, scatter * brightest)
+
+
+def _largest(values) -> np.ndarray:
+    """The largest of three channels, (H, W); many times faster than numpy's along a short last axis."""
+    r, g, b = cv2.split(values)
+    return cv2.max(cv2.max(r, g), b)
 
 
 def _whole_things(mask) -> np.ndarray:
