@@ -150,6 +150,13 @@ def test_a_border_that_is_not_valid_has_no_vote():
     assert not found.doubtful.any()
 
 
+def test_photographs_without_a_valid_pixel_are_doubtful_and_stay(small_bracket):
+    nowhere = [np.zeros(image.shape[:2], bool) for image in small_bracket.images]
+    found = align_mtb(small_bracket.images, valid=nowhere)
+    assert found.doubtful.tolist() == [True, True, False, True, True]
+    assert not found.shifts.any()
+
+
 def test_16_bits_are_aligned_like_8_and_keep_their_values():
     bracket = random_bracket(2, FOUR, 20)
     deep = [image.astype(np.uint16) * 257 for image in bracket.images]

@@ -61,9 +61,9 @@ class View:
         Along an edge a block can slide without looking different, and its neighbours slide with it. Grey levels, rms
         difference over four pixels; 0 where not all of the block is valid.
         """
-        radius = BLOCK // 2 // 2  # in pixels of half
-        least = cv2.cornerMinEigenVal(np.float32(self.half), 2 * radius, ksize=3)
-        least[cv2.erode(self.half_clear, np.ones((2 * radius, 2 * radius), np.uint8)) == 0] = 0
+        block, radius = BLOCK // 2, BLOCK // 4  # in pixels of half
+        least = cv2.cornerMinEigenVal(np.float32(self.half), block, ksize=3)
+        least[cv2.erode(self.half_clear, np.ones((block, block), np.uint8)) == 0] = 0
         rows, cols = (
             np.minimum(np.arange(max(n // CELL, 1)) * CELL // 2 + radius, m - 1)
             for n, m in zip(self.small.shape, least.shape, strict=True)
@@ -127,10 +127,10 @@ def ask_blocks(fixed: View, moving: View, shift, most: int = FEW) -> Vote:
         if len(found) < (2 if len(turns) == 1 else ENOUGH) or best.agree > SURE * asked:
             break
         near = _largest_agreement(found, target, turns, agree * unit)
-        # Another block agrees by chance at few of the places where it was looked for; but we chose among many.
-        places = (2 * REACH + 1) ** 2
-        one = (2 * agree + 1) ** 2 / places
-        chance = min(1.0, len(turns) * places / 9 * float(binom.sf(near.sum() - 1, asked, one)))
+        # Another block agrees by chance at few of the positions that it was tried at; but we chose among many.
+        positions = (2 * REACH + 1) ** 2
+        one = (2 * agree + 1) ** 2 / positions
+        chance = min(1.0, len(turns) * positions / 9 * float(binom.sf(near.sum() - 1, asked, one)))
         if chance < best.chance:
             motion, known = _settled(found[near], target[near], unit, fixed)
             best = Vote(motion, int(near.sum()), asked, chance, known, agree * unit, target[near])
@@ -183,6 +183,9 @@ def look_up(fixed, moving, places, motion, level, reach, size) -> tuple[int, np.
     places : (N, 2) in fixed, pixels of the full picture from its middle
     Returns how many were looked for; of those found, where in moving, and where in fixed; both (n, 2) as places.
     """
+    nothing = 0, np.empty((0, 2)), np.empty((0, 2))
+    if not len(places):
+        return nothing
     unit, radius = 2**level, size // 2
     # The darker picture is brought to the other's brightness; correlation would forgive a factor, but not a curve.
     darker, brighter = sorted((fixed, moving), key=lambda v: v.histogram @ np.arange(256) / v.histogram.sum())
@@ -201,7 +204,7 @@ def look_up(fixed, moving, places, motion, level, reach, size) -> tuple[int, np.
         blocks.append(k)
         offsets.append(cv2.matchTemplate(window, block, cv2.TM_CCOEFF_NORMED))
     if not blocks:
-        return 0, np.empty((0, 2)), np.empty((0, 2))
+        return nothing
     offset, peaked = _peaks(np.array(offsets))
     here, there = here[blocks][peaked] * unit, (there[blocks][peaked] + offset[peaked]) * unit
     return len(blocks), there - moving.middle, here - fixed.middle
