@@ -20,6 +20,7 @@ MIDDLE = 128  # g[MIDDLE] = 0 fixes the gauge: equation 3 leaves g free up to a 
 NOISE = 4  # up to here a pixel value is more noise and rounding than light, whatever the black level
 RINGING = 20  # grey levels by which JPEG pulls a clipped pixel below white where white ends
 CLIPPED = 250  # from here on a pixel value may be a clipped one, pulled down by noise or JPEG
+CHUNK = 1 << 16  # pixels worked on at a time
 FLOOR = 1e-4  # least weight of a smoothness row, so that values that no weight reaches stay defined
 
 
@@ -111,33 +112,12 @@ def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"lam must be positive; got {lam}.")
     if not np.all(np.isfinite(B)) or np.ptp(B) == 0:
         raise ValueError("B must be finite and hold at least two different log exposure times.")
-    return _solve_reduced(Z.astype(np.intp), B, lam, w)
+    return _solve_reduced(Z, B, lam, w)
 
 
 def _solve_reduced(Z, B, lam, w):
-    """Normal equations of g after every log irradiance has been eliminated.
-
-    With W_ij = w(Z_ij)^2 and a_i = sum_j W_ij, the best ln E_i is sum_j W_ij (g(Z_ij) - B_j) / a_i. What is
-    left of pixel i's data term is a sum over pairs of photographs of
-    W_ij W_ik / a_i ((g(Z_ij) - g(Z_ik)) - (B_j - B_k))^2:
-    a graph on the 256 values whose edges say how far apart two values of g should be.
-    """
-    n_photos = Z.shape[1]
-    W = w[Z] ** 2
-    total = W.sum(axis=1)
-    share = np.divide(W, total[:, None], out=np.zeros_like(W), where=total[:, None] > 0)
-
-    edges = np.zeros(LEVELS * LEVELS)  # [u, v]: how strongly values u and v are tied
-    pull = np.zeros(LEVELS)  # how far the times push each value of g up
-    for j in range(n_photos):
-        for k in range(j + 1, n_photos):
-            weight = W[:, j] * share[:, k]
-            edges += np.bincount(Z[:, j] * LEVELS + Z[:, k], weight, LEVELS * LEVELS)
-            step = weight * (B[j] - B[k])
-            pull += np.bincount(Z[:, j], step, LEVELS) - np.bincount(Z[:, k], step, LEVELS)
-    edges = edges.reshape(LEVELS, LEVELS)
-    edges = edges + edges.T
-    np.fill_diagonal(edges, 0)
+    """Normal equations of g after every log irradiance has been eliminated, and their solution."""
+    edges, pull = _ties(Z, B, w**2)
     if not edges.any():
         raise ValueError(
             "No pixel has two different usable values, so nothing ties one pixel value to another; "
@@ -159,8 +139,46 @@ def _solve_reduced(Z, B, lam, w):
         g += scale * scipy.linalg.cho_solve(factor, scale * residual)
     g -= g[MIDDLE]
 
-    log_E = np.where(total > 0, (share * (g[Z] - B)).sum(axis=1), np.nan)
+    log_E = np.empty(len(Z))
+    for few in _chunks(Z):
+        weight = (w**2)[Z[few]]
+        total = weight.sum(axis=1)
+        said = (weight * (g[Z[few]] - B)).sum(axis=1)
+        log_E[few] = np.divide(said, total, out=np.full_like(said, np.nan), where=total > 0)
     return g, log_E
+
+
+def _ties(Z, B, W) -> tuple[np.ndarray, np.ndarray]:
+    """What all pixels say of the 256 values of g: a graph of how strongly two of them are tied, and the pull on each.
+
+    W : (256,), squared weights. With W_ij = W(Z_ij) and a_i = sum_j W_ij, the best ln E_i for a given g is
+    sum_j W_ij (g(Z_ij) - B_j) / a_i. What is left of pixel i's data term is a sum over pairs of photographs of
+    W_ij W_ik / a_i ((g(Z_ij) - g(Z_ik)) - (B_j - B_k))^2:
+    edges, (256, 256), are the sums of W_ij W_ik / a_i over all pixels with these two values; pull, (256,), says how
+    far the times push each value of g up, sum of W_ij (B_j - the pixel's weighted mean of B).
+    """
+    edges, pull = np.zeros(LEVELS * LEVELS), np.zeros(LEVELS)
+    for few in _chunks(Z):
+        z = np.ascontiguousarray(Z[few].T).astype(np.intp)  # a photograph a row
+        weight = W[z]
+        total = weight.sum(axis=0)
+        per = np.divide(1, total, out=np.zeros_like(total), where=total > 0)
+        mean = (weight * B[:, None]).sum(axis=0) * per
+        for j in range(len(z)):
+            pull += np.bincount(z[j], weight[j] * (B[j] - mean), LEVELS)
+            row = z[j] * LEVELS
+            for k in range(j + 1, len(z)):
+                edges += np.bincount(row + z[k], per, LEVELS * LEVELS)
+    # The weights of the two values are the same for all pixels that have them.
+    edges = edges.reshape(LEVELS, LEVELS) * W * W[:, None]
+    edges = edges + edges.T
+    np.fill_diagonal(edges, 0)
+    return edges, pull
+
+
+def _chunks(Z):
+    """Slices of a few pixels at a time: what they need stays in the processor's cache, however many there are."""
+    return (slice(start, start + CHUNK) for start in range(0, len(Z), CHUNK))
 
 
 def sample_pixels(images, n: int, seed: int = 0, valid=None) -> tuple[np.ndarray, np.ndarray]:

@@ -1,10 +1,13 @@
 """Stage 3: the response, against the paper's own matrix, against truth, and under invariances."""
 
+import tracemalloc
+
 import cv2
 import numpy as np
 import pytest
 import scipy.linalg
 
+from hdr_helpers import crf
 from hdr_helpers.crf import black_level, fitted_weights, gsolve, hat_weights, recover_crf, sample_pixels
 from hdr_helpers.lab.metrics import crf_rmse
 from hdr_helpers.load import load_bracket
@@ -59,6 +62,27 @@ def test_strong_smoothness_costs_no_digits():
     Z, _ = gamma_samples(37, noise=3)
     w = WEIGHTS["uniform"]
     assert np.abs(gsolve(Z, B, 1e5, w)[0] - paper_solution(Z, B, 1e5, w)[0]).max() < 1e-8
+
+
+def test_how_many_pixels_are_worked_on_at_a_time_changes_nothing(monkeypatch):
+    Z, _ = gamma_samples(203, noise=3)
+    g, log_E = gsolve(Z, B, 20, HAT)
+    for chunk in 1, 10, 203:
+        monkeypatch.setattr(crf, "CHUNK", chunk)
+        again, log_E_again = gsolve(Z, B, 20, HAT)
+        np.testing.assert_allclose(again, g, atol=1e-10)
+        np.testing.assert_allclose(log_E_again, log_E, atol=1e-10)
+
+
+def test_memory_does_not_grow_with_the_number_of_pixels():
+    peaks = []
+    for count in 2 * crf.CHUNK, 8 * crf.CHUNK:
+        Z = np.random.default_rng(1).integers(0, 256, (count, 3)).astype(np.uint8)
+        tracemalloc.start()
+        _, log_E = gsolve(Z, np.log([0.1, 1, 10]), 20, HAT)
+        peaks.append(tracemalloc.get_traced_memory()[1] - log_E.nbytes)
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0]
 
 
 def test_times_may_repeat():

@@ -7,9 +7,9 @@
 Figures are ratios of one run: the times themselves say as much of the machine.
 """
 
-import multiprocessing
 import sys
 import time
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,6 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from conftest import REAL
+from measure import best_of
 from test_align import FOUR, SIXTEEN, random_bracket
 
 from hdr_helpers import align_mtb, load_bracket
@@ -78,20 +79,6 @@ def truth(count: int) -> None:
         )
 
 
-def _peak(work, images, out) -> None:
-    """Run in a process of its own: seconds, and bytes beyond the photographs at the highest point."""
-
-    def status(key):
-        (line,) = [text for text in Path("/proc/self/status").read_text().splitlines() if text.startswith(key)]
-        return 1024 * int(line.split()[1])
-
-    work([image[:256, :256] for image in images])  # libraries are loaded
-    Path("/proc/self/clear_refs").write_text("5")
-    before, started = status("VmRSS"), time.perf_counter()
-    work(images)
-    out.put((time.perf_counter() - started, status("VmHWM") - before))
-
-
 def _process(images):
     """AlignMTB's own way, into photographs of their own, as align_mtb gives them."""
     aligned = [np.empty_like(image) for image in images]
@@ -101,22 +88,14 @@ def _process(images):
 
 
 def speed() -> None:
-    fork = multiprocessing.get_context("fork")
     print("The best of 5 runs each. Both keep the photographs they were given and make new ones.")
     for height, width in ((1152, 1728), (2832, 4256)):
         for times in (FOUR, SIXTEEN):
             small = random_bracket(0, times, 10, size=(height // 4, width // 4)).images
             images = [cv2.resize(image, (width, height), interpolation=cv2.INTER_CUBIC) for image in small]
-            best = {}
-            for _ in range(5):
-                for work in (align_mtb, _process):
-                    queue = fork.Queue()
-                    process = fork.Process(target=_peak, args=(work, images, queue))
-                    process.start()
-                    figures = queue.get()
-                    process.join()
-                    best[work] = min(best.get(work, figures), figures)
-            (ours, memory), (theirs, other) = best[align_mtb], best[_process]
+            works = partial(align_mtb, images), partial(_process, images)
+            best = best_of(5, *works)
+            (ours, memory), (theirs, other) = (best[work] for work in works)
             print(
                 f"{width * height / 1e6:4.1f} MP x {len(images):2}: {ours:.2f} s, OpenCV {theirs:.2f} s, "
                 f"ratio {ours / theirs:.2f}; memory {memory / 1e6:.0f} MB, OpenCV {other / 1e6:.0f} MB",
