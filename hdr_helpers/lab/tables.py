@@ -1,0 +1,33 @@
+"""Tables that notebooks print, so that their cells show what is computed and not how it is laid out."""
+
+from hdr_helpers.lab.figures import seconds
+
+
+def print_motions(times, motions: dict, alignment) -> None:
+    """How each photograph was moved, by several answers, and how sure align_mtb is of its own.
+
+    times : (P,) seconds
+    motions : from a name to (P, 2) shifts in pixels, or to (P, 3) shifts and degrees
+    alignment : Alignment, whose percentiles, blocks and doubts stand in the last column
+    """
+    width = 11 if all(len(rows[0]) == 2 for rows in motions.values()) else 23
+    print(f"{'time':>8} " + "".join(f"{name:>{width}}" for name in motions) + "   percentile, blocks that agree")
+    for k, time in enumerate(times):
+        row = "".join(f"{_spelled(*rows[k]):>{width}}" for rows in motions.values())
+        print(f"{seconds(time):>8} {row}   {_how(alignment, k)}")
+
+
+def _spelled(dx, dy, degrees=None) -> str:
+    if degrees is None:
+        return f"({dx:+.0f}, {dy:+.0f})"
+    return f"({dx + 0.0:+.2f}, {dy + 0.0:+.2f}) {degrees + 0.0:+.3f}°"
+
+
+def _how(alignment, k) -> str:
+    match, doubt = alignment.matches[k], alignment.doubt(k)
+    if k == alignment.reference:
+        return "the reference"
+    if match is None:
+        return f"doubtful: {doubt}"
+    percentile = "-" if match.percentile is None else f"{match.percentile:g}"
+    return f"{percentile}, {match.agree}/{match.blocks}{f'   doubtful: {doubt}' if doubt else ''}"
