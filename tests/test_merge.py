@@ -79,6 +79,15 @@ def test_clipped_everywhere_gives_the_nearest_bound(values, bound):
     np.testing.assert_allclose(radiance, np.exp(crf[0][values[0]]) / bound, rtol=1e-2)
 
 
+@pytest.mark.parametrize("value, masked, bound", [(255, 0, 0.2), (255, 2, 0.02), (0, 2, 0.2), (0, 0, 2.0)])
+def test_where_the_nearest_bound_is_masked_the_next_one_decides(value, masked, bound):
+    crf = np.tile(np.linspace(-6, 3, 256), (3, 1))
+    images = [np.full((4, 5, 3), value, np.uint8)] * 3
+    valid = [np.full((4, 5), k != masked) for k in range(3)]
+    radiance = merge_debevec(images, (0.02, 0.2, 2.0), crf, HAT, valid)
+    np.testing.assert_allclose(radiance, np.exp(crf[0][value]) / bound, rtol=1e-2)
+
+
 @pytest.mark.parametrize("w", [None, HAT, HAT + 1])
 def test_the_radiance_is_finite_and_positive_whatever_the_values(w):
     extremes = np.array(np.meshgrid(*[[0, 1, 128, 249, 254, 255]] * 3), np.uint8).reshape(3, 1, -1, 1)
