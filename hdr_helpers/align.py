@@ -110,7 +110,7 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
     with ThreadPoolExecutor() as pool:  # OpenCV and NumPy work side by side
         views = list(pool.map(partial(View, levels=levels), images, valid or [None] * len(images)))
         chains = pool.map(partial(match_chain, views, reference, max_shift), sides)
-        found = {reference: (None, Motion()), **{k: pair for chain in chains for k, pair in chain.items()}}
+        found = {k: pair for chain in chains for k, pair in chain.items()}
         matches, motions = zip(*(found[k] for k in range(len(images))), strict=True)
         turned = any(m.reach(shape) >= TURNED for m in motions)
         motions = [m if m.reach(shape) >= TURNED else Motion(round(m.dx), round(m.dy)) for m in motions]
@@ -120,17 +120,17 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
         shifts=np.array([(m.dx, m.dy) for m in motions], dtype=np.float64),
         rotations=np.array([m.degrees for m in motions]),
         reference=reference,
-        doubtful=np.array([not _sure(matches, k, turned) for k in range(len(images))]),
+        doubtful=np.array([not _sure(matches, k, reference, turned) for k in range(len(images))]),
         matches=matches,
     )
 
 
-def _sure(matches, k, turned) -> bool:
+def _sure(matches, k, reference, turned) -> bool:
     """Whether photograph k lies where it belongs: its match, and those of the photographs it was laid on, tell so."""
     match = matches[k]
-    if match is None or not match.trusted:
-        return k == len(matches) // 2
-    return (match.turn_known or not turned) and _sure(matches, match.partner, turned)
+    if k == reference or match is None or not match.trusted:
+        return k == reference
+    return (match.turn_known or not turned) and _sure(matches, match.partner, reference, turned)
 
 
 def _moved(image, motion: Motion) -> np.ndarray:
@@ -207,10 +207,15 @@ def remove_ghosts(bracket: Bracket, reference: int | None = None) -> Ghosts:
     if reference is None:
         reference = _best_seen(bracket)
     images, valid = register_locally(bracket.images, reference, bracket.valid)
-    before = [True] * len(images) if bracket.valid is None else bracket.valid
-    lost = [old & ~new for old, new in zip(before, valid, strict=True)]
     warped = [np.any(a != b, axis=2) for a, b in zip(images, bracket.images, strict=True) if a is not b]
-    return Ghosts(replace(bracket, images=images, valid=valid), reference, np.logical_or.reduce([*lost, *warped]))
+    moved = np.logical_or.reduce([_lost(bracket.valid, valid), *warped])
+    return Ghosts(replace(bracket, images=images, valid=valid), reference, moved)
+
+
+def _lost(before, after) -> np.ndarray:
+    """(H, W) bool: where at least one photograph had a say and has none any more. before : masks, or None for all."""
+    before = [True] * len(after) if before is None else before
+    return np.logical_or.reduce([old & ~new for old, new in zip(before, after, strict=True)])
 
 
 def _best_seen(bracket) -> int:
@@ -219,10 +224,10 @@ def _best_seen(bracket) -> int:
     size = [max(1, round(n * scale)) for n in bracket.images[0].shape[1::-1]]
     images = [cv2.resize(in_8_bits(image), size, interpolation=cv2.INTER_AREA) for image in bracket.images]
     valid = bracket.valid and [
-        cv2.resize(m.view(np.uint8), size, interpolation=cv2.INTER_AREA) > 0 for m in bracket.valid
+        cv2.resize(mask.view(np.uint8) * np.uint8(255), size, interpolation=cv2.INTER_AREA) == 255
+        for mask in bracket.valid
     ]
     middle = len(images) // 2
-    _, masks = register_locally(images, middle, valid)
-    moved = ~np.logical_and.reduce(masks)
+    moved = _lost(valid, register_locally(images, middle, valid)[1])
     seen = [np.count_nonzero(((image > DARK) & (image < BRIGHT)).all(axis=2) & moved) for image in images]
     return max(range(len(images)), key=lambda k: (seen[k], -abs(k - middle)))

@@ -96,14 +96,18 @@ def merge_debevec(images, times, crf, w=None, valid=None) -> np.ndarray:
 
 
 def _tables(times, crf, w, values: int) -> tuple[np.ndarray, np.ndarray]:
-    """w(z) (g(z) - ln dt) and w(z) for every photograph, each (P, 1, values, 3) float32 as cv2.LUT wants it."""
+    """w(z) (g(z) - ln dt) and w(z) for every photograph, each (P, 1, values, 3) float32 as cv2.LUT wants it.
+
+    times : ascending
+    """
     z = np.linspace(0, LEVELS - 1, values)  # 256 values, or 65,536 between them
     crf, w = np.array([np.interp(z, np.arange(LEVELS), g) for g in crf]), np.interp(z, np.arange(LEVELS), w)
     # Where no photograph is usable the nearest bound decides: of the bright values the shortest exposure's, of the
     # dark ones the longest's; where that one is not valid, the next one's.
-    rank = np.argsort(np.argsort(times))
-    nearest = np.where(np.arange(values) >= values // 2, rank[:, None], rank[::-1, None])
-    weights = np.maximum(w, w.max() * np.maximum(LAST_RESORT * NEXT_RESORT**nearest, LEAST))
+    from_shortest = np.arange(len(times))[:, None]
+    from_longest = len(times) - 1 - from_shortest
+    nearest = np.where(np.arange(values) >= values // 2, from_shortest, from_longest)
+    weights = np.maximum(w / w.max(), np.maximum(LAST_RESORT * NEXT_RESORT**nearest, LEAST))
     weighted = weights[..., None] * (crf.T - np.log(times)[:, None, None])
     weights = np.repeat(weights[..., None], 3, axis=2)
     return tuple(np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))

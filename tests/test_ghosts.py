@@ -155,6 +155,8 @@ def test_bad_input_is_refused_in_a_sentence(handheld):
         register_locally(handheld.images, 5)
     with pytest.raises(ValueError, match="one size and one type"):
         register_locally([handheld.images[0], handheld.images[1][:-1]], 0)
+    with pytest.raises(ValueError, match="uint8 or uint16"):
+        register_locally([image / 255 for image in handheld.images], 0)
     with pytest.raises(ValueError, match="one mask of"):
         register_locally(handheld.images, 0, [np.ones((3, 3), bool)] * 5)
 

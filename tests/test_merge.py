@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hdr_helpers.align import align_mtb, crop_common
-from hdr_helpers.crf import hat_weights, recover_crf
+from hdr_helpers.crf import fitted_weights, hat_weights, recover_crf
 from hdr_helpers.lab.camera import Camera
 from hdr_helpers.lab.metrics import radiance_error
 from hdr_helpers.load import Bracket, load_bracket
@@ -77,6 +77,13 @@ def test_clipped_everywhere_gives_the_nearest_bound(values, bound):
     images = [np.full((4, 5, 3), value, np.uint8) for value in values]
     radiance = merge_debevec(images, (0.02, 0.2, 2.0), crf, HAT)
     np.testing.assert_allclose(radiance, np.exp(crf[0][values[0]]) / bound, rtol=1e-2)
+
+
+def test_the_size_of_all_weights_together_changes_nothing(small_bracket):
+    crf, w = small_bracket.truth.crf, fitted_weights(small_bracket.images)
+    results = [merge_debevec(small_bracket.images, small_bracket.times, crf, w * size) for size in (1, 1e-6, 1e6)]
+    for other in results[1:]:
+        np.testing.assert_allclose(other, results[0], rtol=1e-4)
 
 
 @pytest.mark.parametrize("value, masked, bound", [(255, 0, 0.2), (255, 2, 0.02), (0, 2, 0.2), (0, 0, 2.0)])

@@ -20,7 +20,7 @@ from hdr_helpers.lab.figures import (
     viewed_at,
 )
 from hdr_helpers.lab.metrics import crf_rmse
-from hdr_helpers.papers.ward2003 import disagreement
+from hdr_helpers.papers.ward2003 import one_level_finer
 from hdr_helpers.tonemap import OPERATORS, expose_for_screen, tonemap
 
 PREVIEW = 640  # pixels across in explorers that compute while a slider moves
@@ -91,8 +91,7 @@ def pyramid_walk(fixed, moving, reach) -> list[tuple[int, int]]:
     for level in reversed(range(levels)):
         size = fixed.shape[1] >> level, fixed.shape[0] >> level
         pair = [bitmaps(cv2.resize(gray, size, interpolation=cv2.INTER_AREA)) for gray in (fixed, moving)]
-        near = [(2 * shift[0] + i, 2 * shift[1] + j) for j in (0, -1, 1) for i in (0, -1, 1)]
-        shift = min(near, key=lambda s, pair=pair: disagreement(*pair, s))
+        shift = one_level_finer(*pair, shift)
         steps.append((shift[0] << level, shift[1] << level))
     return steps
 

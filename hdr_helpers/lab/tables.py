@@ -27,7 +27,8 @@ def _how(alignment, k) -> str:
     match, doubt = alignment.matches[k], alignment.doubt(k)
     if k == alignment.reference:
         return "the reference"
-    if match is None:
-        return f"doubtful: {doubt}"
-    percentile = "-" if match.percentile is None else f"{match.percentile:g}"
-    return f"{percentile}, {match.agree}/{match.blocks}{f'   doubtful: {doubt}' if doubt else ''}"
+    how = "-"
+    if match is not None:
+        percentile = "-" if match.percentile is None else f"{match.percentile:g}"
+        how = f"{percentile}, {match.agree}/{match.blocks}"
+    return f"{how}   doubtful: {doubt}" if doubt else how

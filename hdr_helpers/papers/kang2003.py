@@ -40,8 +40,9 @@ def register_locally(images, reference: int, valid=None) -> tuple[tuple, tuple]:
     Raises ValueError where shapes or the reference don't fit.
     """
     images = list(images)
-    if len({(image.shape, image.dtype) for image in images}) != 1 or images[0].shape[2:] != (3,):
-        raise ValueError("Photographs must be (H, W, 3), of one size and one type.")
+    forms = {(image.shape, image.dtype) for image in images}
+    if len(forms) != 1 or images[0].shape[2:] != (3,) or images[0].dtype not in (np.uint8, np.uint16):
+        raise ValueError("Photographs must be (H, W, 3) uint8 or uint16, of one size and one type.")
     if not 0 <= reference < len(images):
         raise ValueError(f"reference must be 0 to {len(images) - 1}; got {reference}.")
     valid = [np.ones(images[0].shape[:2], dtype=bool)] * len(images) if valid is None else list(valid)

@@ -62,11 +62,19 @@ def likely_shifts(fixed, moving, percentile: float, max_shift: int) -> list[tupl
     found = []
     for shift in _every_shift(*pairs[-1], -(-max_shift // 2 ** (len(pairs) - 1))):
         for pair in pairs[-2::-1]:
-            x, y = 2 * shift[0], 2 * shift[1]
-            near = [(x + i, y + j) for j in (0, -1, 1) for i in (0, -1, 1)]  # of equals, the first
-            shift = min(near, key=partial(disagreement, *pair))
+            shift = one_level_finer(*pair, shift)
         found.append(shift)
     return list(dict.fromkeys(found))
+
+
+def one_level_finer(fixed, moving, shift) -> tuple[int, int]:
+    """Of twice a shift (dx, dy) and its eight neighbours, the one at which two bitmaps disagree least.
+
+    fixed, moving : (bright, clear) as bitmaps returns them, twice as large as where shift was found
+    """
+    x, y = 2 * shift[0], 2 * shift[1]
+    near = [(x + i, y + j) for j in (0, -1, 1) for i in (0, -1, 1)]  # of equals, the first
+    return min(near, key=partial(disagreement, fixed, moving))
 
 
 def disagreement(fixed, moving, shift) -> float:
