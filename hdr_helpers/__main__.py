@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--overwrite", action="store_true", help="replace results of an earlier run in OUT")
     parser.add_argument("--no-align", action="store_true", help="the photographs lie on each other already")
     parser.add_argument("--keep-ghosts", action="store_true", help="merge all photographs even where something moved")
-    parser.add_argument("--lam", type=_positive, default=20.0, help="smoothness of the curve (default: %(default)g)")
+    parser.add_argument("--lam", type=_positive, default=1.0, help="smoothness of the curve (default: %(default)g)")
     parser.add_argument(
         "--tonemap", choices=sorted(OPERATORS), default="durand", help="operator (default: %(default)s)"
     )
@@ -119,7 +119,9 @@ def _run(bracket: Bracket, out: Path, options) -> None:
         aligned = ghosts.bracket
 
     print("\nRecovering the response, merging, tone-mapping ...", flush=True)
-    crf = recover_crf(aligned, lam=options.lam)
+    response = recover_crf(aligned, lam=options.lam)
+    crf, errors = response.crf, response.errors
+    print(f"The response is recovered by {response.method}.")
     radiance = merge_debevec(aligned.images, aligned.times, crf, valid=aligned.valid)
     print(f"Dynamic range of the scene: {dynamic_range_stops(radiance):.1f} stops (99.9th over 0.1th percentile).")
     picture = tonemap(radiance, options.tonemap)
@@ -128,8 +130,9 @@ def _run(bracket: Bracket, out: Path, options) -> None:
         error = radiance_error(radiance, aligned.truth.radiance)
         print(f"The truth is known here: median error {error.median:.3f} stops, 95% below {error.p95:.3f}.")
 
-    table = np.column_stack([np.arange(crf.shape[1]), crf.T])
-    lines = ["value,red,green,blue", *(f"{int(z)},{r:.6f},{g:.6f},{b:.6f}" for z, r, g, b in table)]
+    names = ["red", "green", "blue"]
+    lines = [",".join(["value", *names, *(f"{name}_error" for name in names)])]
+    lines += [f"{z}," + ",".join(f"{x:.6f}" for x in row) for z, row in enumerate(np.vstack([crf, errors]).T)]
     out.mkdir(parents=True, exist_ok=True)
     write_hdr(out / RADIANCE, radiance)
     write_whole(out / CURVE, ("\n".join(lines) + "\n").encode())

@@ -9,85 +9,66 @@ weighted mean, and putting that mean back leaves a problem in the 256 values of 
 however many pixels there are. That is how gsolve works; the matrix of the paper's appendix is never built.
 """
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 import scipy.linalg
 
+from hdr_helpers._response import LEVELS, MIDDLE
+from hdr_helpers._response.clipping import black_level, whole_white
+from hdr_helpers._response.samples import sample_pixels
+from hdr_helpers._response.weights import (
+    NOISE,
+    checked_weights,
+    fitted_weights,
+    gaussian_weights,
+    hat_weights,
+    noise_weights,
+    uniform_weights,
+)
 from hdr_helpers.load import Bracket, in_8_bits
+from hdr_helpers.papers.grossberg_nayar2003 import response_from_transfers
 
-LEVELS = 256
-MIDDLE = 128  # g[MIDDLE] = 0 fixes the gauge: equation 3 leaves g free up to a constant
-NOISE = 4  # up to here a pixel value is more noise and rounding than light, whatever the black level
-RINGING = 20  # grey levels by which JPEG pulls a clipped pixel below white where white ends
-CLIPPED = 250  # from here on a pixel value may be a clipped one, pulled down by noise or JPEG
+__all__ = [
+    "LEVELS",
+    "MIDDLE",
+    "Response",
+    "black_level",
+    "checked_weights",
+    "crf_opencv",
+    "fitted_weights",
+    "gaussian_weights",
+    "gsolve",
+    "hat_weights",
+    "noise_weights",
+    "recover_crf",
+    "sample_pixels",
+    "uniform_weights",
+    "whole_white",
+]
+
 CHUNK = 1 << 16  # pixels worked on at a time
 FLOOR = 1e-4  # least weight of a smoothness row, so that values that no weight reaches stay defined
+SMOOTHNESS = 20.0  # lambda for 100 pixels
+EVIDENCE = 12_000_000  # pixel values of one channel that recover_crf looks at: 12 megapixels in 16 as 2 in 6
+# Pairs of exposures by which a response is recovered, in stops: nearer ones share too much noise, farther ones values.
+NEAREST, FARTHEST = 2.4, 6.6
 
 
-def hat_weights(black: int = 0, clipped: int = LEVELS) -> np.ndarray:
-    """Weight of each pixel value, a hat that trusts the middle (equation 4).
+@dataclass(frozen=True, eq=False)
+class Response:
+    """A camera's response as recovered.
 
-    black : the camera's black level; values up to it get weight 0, and the hat rises from there
-    clipped : values from here on get weight 0
-    Returns (256,) float64. The defaults give the paper's hat: 0 at 0 and at 255, 127 in the middle.
+    crf : (3, 256) float64, log inverse response of red, green and blue, crf[:, 128] = 0
+    errors : (3, 256) float64, standard error of each difference crf[c, z] - crf[c, 128]; noise and rounding are in
+        it, JPEG only as far as it makes photographs disagree
+    method : for people, how it was found
     """
-    z = np.arange(LEVELS)
-    w = np.clip(np.minimum(z - black, LEVELS - 1 - z), 0, None).astype(np.float64)
-    w[clipped:] = 0
-    return w
 
-
-def fitted_weights(images, valid=None) -> np.ndarray:
-    """The hat over the pixel values that this camera can be trusted with: above black, below CLIPPED.
-
-    images : P arrays (H, W, 3) uint8 or uint16, shortest exposure first
-    valid : P arrays (H, W) bool, the pixels that count, or None for all
-    """
-    return hat_weights(max(black_level(images, valid), NOISE), CLIPPED)
-
-
-def checked_weights(w) -> np.ndarray:
-    """w as (256,) float64. Raises ValueError unless it holds 256 weights, none negative and not all 0."""
-    w = np.asarray(w, dtype=np.float64)
-    if w.shape != (LEVELS,) or w.min() < 0 or not w.max() > 0:
-        raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
-    return w
-
-
-def black_level(images, valid=None) -> int:
-    """The pixel value that stands for no light: 0 in most files, about 17 in some scans.
-
-    images : P arrays (H, W, 3) uint8 or uint16 (in 8 bits), aligned, shortest exposure first
-    valid : P arrays (H, W) bool, the pixels that count, or None for all
-    It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
-    nothing of the scene, yet each of the short exposures would say it with conviction.
-    """
-    if len(images) < 2:
-        return 0
-    shortest, longer = (in_8_bits(image[::2, ::2]) for image in images[:2])
-    pairs = shortest.astype(np.intp) * LEVELS + longer
-    if valid is not None:
-        pairs = pairs[(valid[0] & valid[1])[::2, ::2]]
-    joint = np.bincount(pairs.ravel(), minlength=LEVELS**2).reshape(LEVELS, LEVELS)
-    count = joint.sum(axis=1)
-    median = np.argmax(np.cumsum(joint, axis=1) >= count[:, None] / 2, axis=1)
-    dark = np.arange(LEVELS) < LEVELS // 4
-    still = dark & (count > 1e-3 * count.sum()) & (median <= np.arange(LEVELS))
-    return int(np.flatnonzero(still).max(initial=0))
-
-
-def whole_white(image, valid=None) -> np.ndarray:
-    """A photograph, (H, W, 3) uint8 or uint16, in which what is almost white and touches white is white.
-
-    A clipped area in a JPEG is not all 255: here and there it reads 245, which would pass for a measurement.
-    In a long exposure such a pixel says of the sun that it is hundreds of times too dim: it must not vote.
-    valid : (H, W) bool, the pixels that can be touched, or None for all
-    """
-    white = np.iinfo(image.dtype).max
-    level = white // (LEVELS - 1)
-    light = image if valid is None else image * valid[..., None]
-    touches_white = cv2.dilate(light, np.ones((3, 3), np.uint8)) >= CLIPPED * level
-    return np.where(touches_white & (image >= (CLIPPED - RINGING) * level), image.dtype.type(white), image)
+    crf: np.ndarray
+    errors: np.ndarray
+    method: str
 
 
 def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
@@ -112,11 +93,11 @@ def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"lam must be positive; got {lam}.")
     if not np.all(np.isfinite(B)) or np.ptp(B) == 0:
         raise ValueError("B must be finite and hold at least two different log exposure times.")
-    return _solve_reduced(Z, B, lam, w)
+    return _solve_reduced(Z, B, lam, w)[:2]
 
 
 def _solve_reduced(Z, B, lam, w):
-    """Normal equations of g after every log irradiance has been eliminated, and their solution."""
+    """Normal equations of g after every log irradiance has been eliminated: g, log_E and the standard errors of g."""
     edges, pull = _ties(Z, B, w**2)
     if not edges.any():
         raise ValueError(
@@ -139,13 +120,18 @@ def _solve_reduced(Z, B, lam, w):
         g += scale * scipy.linalg.cho_solve(factor, scale * residual)
     g -= g[MIDDLE]
 
-    log_E = np.empty(len(Z))
+    log_E, missed, used = np.empty(len(Z)), 0.0, 0
     for few in _chunks(Z):
         weight = (w**2)[Z[few]]
         total = weight.sum(axis=1)
-        said = (weight * (g[Z[few]] - B)).sum(axis=1)
-        log_E[few] = np.divide(said, total, out=np.full_like(said, np.nan), where=total > 0)
-    return g, log_E
+        said = g[Z[few]] - B
+        log_E[few] = np.divide((weight * said).sum(axis=1), total, out=np.full(len(total), np.nan), where=total > 0)
+        missed += np.nansum(weight * (said - log_E[few, None]) ** 2)
+        used += np.count_nonzero(weight) - np.count_nonzero(total)
+    # The weights say how the variances of two rows compare; what the equations miss says how large they are.
+    covariance = scale[:, None] * scipy.linalg.cho_solve(factor, np.diag(scale)) * (missed / max(used, 1))
+    variances = covariance.diagonal() - 2 * covariance[MIDDLE] + covariance[MIDDLE, MIDDLE]
+    return g, log_E, np.sqrt(np.maximum(variances, 0))
 
 
 def _ties(Z, B, W) -> tuple[np.ndarray, np.ndarray]:
@@ -181,53 +167,68 @@ def _chunks(Z):
     return (slice(start, start + CHUNK) for start in range(0, len(Z), CHUNK))
 
 
-def sample_pixels(images, n: int, seed: int = 0, valid=None) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of n pixels spread over the picture and over its brightness.
+def recover_crf(bracket: Bracket, lam: float = 1.0) -> Response:
+    """The camera's log inverse response for red, green and blue, by the best method that the photographs allow.
 
-    images : P arrays (H, W, 3) uint8
-    valid : (H, W) bool, the pixels that may be taken; None takes any
-    Returns two (n,) integer arrays. Pixels are taken as points, never as averages: the response is not
-    linear, so the mean of some values is not the value of their mean. They are drawn evenly from the
-    pixels sorted by brightness, so that every pixel value is met; seeded, so that a run can be repeated.
-    Raises ValueError where there are fewer than n pixels.
+    bracket : Bracket with P >= 2 photographs; of 16-bit ones the upper 8 bits speak, and only valid pixels
+    lam : smoothness; 1 is right for cameras, larger is smoother. How many pixels there are changes nothing in it.
+
+    Brightness transfer functions take the whole image's evidence and are not bent by noise
+    (papers/grossberg_nayar2003.py). Where there is too little of it for them, the paper's least squares has to do.
+    Of large brackets every second, third ... pixel each way speaks, so that EVIDENCE values do.
+    Returns a Response. Its curves nowhere fall.
+    Raises ValueError where nothing ties one pixel value to another, or lam is not positive.
     """
-    valid = np.ones(images[0].shape[:2], dtype=bool) if valid is None else valid
-    count = np.count_nonzero(valid)
-    if n > count:
-        raise ValueError(f"{n} pixels were asked for; the photographs have {count}.")
-    # A grid of some ten times as many pixels is choice enough, and large photographs stay quick to sort.
-    stride = max(1, int(np.sqrt(count / (10 * n))))
-    # No single photograph tells the brightnesses of a high-range scene apart: their sum does.
-    brightness = np.sum([image[::stride, ::stride].sum(axis=2, dtype=np.int64) for image in images], axis=0)
-    rng = np.random.default_rng(seed)
-    order = np.lexsort((rng.random(brightness.size), brightness.ravel()))  # equal ones in random order
-    order = order[valid[::stride, ::stride].ravel()[order]]
-    bins = np.linspace(0, len(order), n + 1).astype(int)
-    picked = order[rng.integers(bins[:-1], bins[1:])]
-    rows, cols = np.unravel_index(picked, brightness.shape)
-    return rows * stride, cols * stride
-
-
-def recover_crf(bracket: Bracket, lam: float = 20.0, n: int = 20_000, seed: int = 0) -> np.ndarray:
-    """The camera's log inverse response for red, green and blue.
-
-    bracket : Bracket with P >= 2 photographs; of 16-bit ones the upper 8 bits speak, and only pixels that
-        are valid in all of them
-    lam : smoothness as for a sample of 100 pixels; it is scaled with the sample, so that more pixels give
-        a surer curve and not a rougher one
-    n : how many pixels speak, at most
-    Returns crf, (3, 256) float64 with crf[:, 128] = 0; nowhere falling.
-    """
-    masks = bracket.valid or [None] * len(bracket)
-    images = [whole_white(in_8_bits(image), mask) for image, mask in zip(bracket.images, masks, strict=True)]
-    valid = np.ones(images[0].shape[:2], bool) if bracket.valid is None else np.logical_and.reduce(bracket.valid)
-    rows, cols = sample_pixels(images, min(n, np.count_nonzero(valid)), seed, valid)
-    Z = np.stack([image[rows, cols] for image in images], axis=1)  # (N, P, 3)
-    w = fitted_weights(images, bracket.valid)
-    curves = [gsolve(Z[..., c], bracket.log_times, lam * np.sqrt(len(Z) / 100), w)[0] for c in range(3)]
+    if not lam > 0:
+        raise ValueError(f"lam must be positive; got {lam}.")
+    step = int(np.ceil(np.sqrt(bracket.images[0][..., 0].size * len(bracket) / EVIDENCE)))
+    few = np.s_[::step, ::step]
+    images = [in_8_bits(image[few]) for image in bracket.images]
+    valid = None if bracket.valid is None else [mask[few] for mask in bracket.valid]
+    try:
+        curves, errors = _by_transfers(images, bracket.log_times, lam, valid)
+        method = "brightness transfer functions (Grossberg and Nayar 2003)"
+    except ValueError:
+        curves, errors = _by_least_squares(bracket, lam)
+        method = "least squares (Debevec and Malik 1997)"
     # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).
     curves = np.maximum.accumulate(curves, axis=1)
-    return curves - curves[:, MIDDLE : MIDDLE + 1]
+    return Response(curves - curves[:, MIDDLE : MIDDLE + 1], errors, method)
+
+
+def _by_transfers(images, log_times, lam, valid):
+    """Curves and errors from the joint histograms of pairs of photographs, each (3, 256)."""
+    stops = (log_times[None] - log_times[:, None]) / np.log(2)
+    pairs = np.argwhere((stops > NEAREST) & (stops < FARTHEST))  # shorter, longer
+    if len(np.unique(pairs)) < len(images):  # photographs close to each other are better than none
+        pairs = np.argwhere((stops > 0) & (stops < FARTHEST))
+    masks = [None if valid is None else (valid[j] & valid[k]).view(np.uint8) for k, j in pairs]
+    ratios = [log_times[j] - log_times[k] for k, j in pairs]
+    black = black_level(images, valid)
+    black = black if black > NOISE else 0  # a value or two is rounding, not a level
+
+    def channel(c):
+        planes = [np.ascontiguousarray(image[..., c]) for image in images]
+        joints = [
+            cv2.calcHist([planes[j], planes[k]], [0, 1], mask, [LEVELS, LEVELS], [0, LEVELS, 0, LEVELS])
+            for (k, j), mask in zip(pairs, masks, strict=True)
+        ]
+        return response_from_transfers(joints, ratios, len(images), lam, black)
+
+    return np.stack([channel(c) for c in range(3)], axis=1)
+
+
+def _by_least_squares(bracket, lam):
+    """Curves and errors by gsolve's equations from all pixels that are valid in all photographs, each (3, 256)."""
+    masks = bracket.valid or [None] * len(bracket)
+    images = [whole_white(in_8_bits(image), mask) for image, mask in zip(bracket.images, masks, strict=True)]
+    everywhere = np.ones(images[0].shape[:2], bool) if bracket.valid is None else np.logical_and.reduce(bracket.valid)
+    Z = np.stack([image[everywhere] for image in images], axis=1)  # (N, P, 3)
+    w = fitted_weights(images, bracket.valid)
+    # As smooth as 100 pixels would be with SMOOTHNESS: more give a surer curve, not a rougher one.
+    lam *= SMOOTHNESS * np.sqrt(len(Z) / 100)
+    curves = [_solve_reduced(Z[..., c], bracket.log_times, lam, w) for c in range(3)]
+    return np.array([[g for g, _, _ in curves], [errors for _, _, errors in curves]])
 
 
 def crf_opencv(bracket: Bracket, method: str = "debevec") -> np.ndarray:

@@ -175,7 +175,7 @@ def test_gsolve_refuses_what_does_not_fit(bad, message):
 
 
 def test_the_chapels_curve_is_at_least_as_near_to_truth_as_opencvs(chapel):
-    crf = recover_crf(chapel)
+    crf = recover_crf(chapel).crf
     bgr = [np.ascontiguousarray(image[..., ::-1]) for image in chapel.images]
     response = cv2.createCalibrateDebevec().process(bgr, chapel.times.astype(np.float32))
     opencvs = np.log(response[:, 0, ::-1].T)
@@ -183,16 +183,16 @@ def test_the_chapels_curve_is_at_least_as_near_to_truth_as_opencvs(chapel):
     assert crf_rmse(crf, chapel.truth.crf).max() < 0.05
 
 
-@pytest.mark.parametrize("lam, n", [(50, 20_000), (0.01, 50), (0.1, 200)])
-def test_a_recovered_curve_never_falls_and_keeps_its_gauge(small_bracket, lam, n):
-    crf = recover_crf(small_bracket, lam, n)
+@pytest.mark.parametrize("lam", [1, 1e-3, 100])
+def test_a_recovered_curve_never_falls_and_keeps_its_gauge(small_bracket, lam):
+    crf = recover_crf(small_bracket, lam).crf
     assert crf.shape == (3, 256)
     assert np.all(np.diff(crf, axis=1) >= 0)
     assert np.all(crf[:, 128] == 0)
 
 
 def test_more_smoothness_gives_a_smoother_curve(small_bracket):
-    bend = [np.sum(np.diff(recover_crf(small_bracket, lam, 500), 2) ** 2) for lam in (1, 10, 100)]
+    bend = [np.sum(np.diff(recover_crf(small_bracket, lam).crf[:, 10:], 2) ** 2) for lam in (0.01, 0.1, 1)]
     assert bend[0] > bend[1] > bend[2]
 
 

@@ -110,7 +110,7 @@ def test_a_sun_clipped_in_every_exposure_stays_the_brightest(known):
     scene = np.where(inside[..., None], 1e4, ramp)
     camera, times = Camera(seed=8), np.array([1, 4, 16, 64.0])
     bracket = Bracket(tuple(camera.photograph(scene * t, i) for i, t in enumerate(times)), times, tuple("abcd"))
-    crf = camera.crf() if known else recover_crf(bracket)
+    crf = camera.crf() if known else recover_crf(bracket).crf
     radiance = merge_debevec(bracket.images, times, crf)
     away = cv2.dilate(inside.astype(np.uint8), np.ones((17, 17))) == 0  # beyond what JPEG smears over the edge
     assert np.all(radiance[inside].min(axis=0) > radiance[away].max(axis=0))
@@ -120,7 +120,7 @@ def test_a_sun_clipped_in_every_exposure_stays_the_brightest(known):
 
 
 def test_the_chapel_is_at_least_as_near_to_truth_as_opencvs(chapel):
-    ours = merge_debevec(chapel.images, chapel.times, recover_crf(chapel))
+    ours = merge_debevec(chapel.images, chapel.times, recover_crf(chapel).crf)
     bgr, times = [np.ascontiguousarray(i[..., ::-1]) for i in chapel.images], chapel.times.astype(np.float32)
     response = cv2.createCalibrateDebevec().process(bgr, times)
     theirs = cv2.createMergeDebevec().process(bgr, times, response)[..., ::-1]
@@ -151,7 +151,7 @@ def test_the_memorial_agrees_with_its_published_radiance_map(real):
     bracket = load_bracket(real("memorial"))
     aligned = align_mtb(bracket.images)
     images = crop_common(aligned.images, aligned.shifts)
-    crf = recover_crf(Bracket(images, bracket.times, bracket.names))
+    crf = recover_crf(Bracket(images, bracket.times, bracket.names)).crf
     ours, theirs = luminance(merge_debevec(images, bracket.times, crf)), luminance(reference)
     valid = theirs > 0
     assert np.corrcoef(np.log(ours[valid]), np.log(theirs[valid]))[0, 1] >= 0.99
