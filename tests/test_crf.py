@@ -1,6 +1,9 @@
 """Stage 3: the response, against the paper's own matrix, against truth, and under invariances."""
 
+import itertools
 import tracemalloc
+from dataclasses import replace
+from functools import cache, partial
 
 import cv2
 import numpy as np
@@ -8,9 +11,21 @@ import pytest
 import scipy.linalg
 
 from hdr_helpers import crf
-from hdr_helpers.crf import black_level, fitted_weights, gsolve, hat_weights, recover_crf, sample_pixels
+from hdr_helpers.crf import (
+    black_level,
+    fitted_weights,
+    gaussian_weights,
+    gsolve,
+    hat_weights,
+    noise_weights,
+    recover_crf,
+    sample_pixels,
+    uniform_weights,
+)
+from hdr_helpers.lab.camera import FAMILIES
 from hdr_helpers.lab.metrics import crf_rmse
-from hdr_helpers.load import load_bracket
+from hdr_helpers.lab.scenes import random_scene
+from hdr_helpers.load import Bracket, BracketError, load_bracket
 
 HAT = hat_weights()
 WEIGHTS = {
@@ -174,13 +189,144 @@ def test_gsolve_refuses_what_does_not_fit(bad, message):
 # ----------------------------------------------------------------------------------- whole curves
 
 
-def test_the_chapels_curve_is_at_least_as_near_to_truth_as_opencvs(chapel):
-    crf = recover_crf(chapel).crf
-    bgr = [np.ascontiguousarray(image[..., ::-1]) for image in chapel.images]
-    response = cv2.createCalibrateDebevec().process(bgr, chapel.times.astype(np.float32))
-    opencvs = np.log(response[:, 0, ::-1].T)
-    assert np.all(crf_rmse(crf, chapel.truth.crf) <= crf_rmse(opencvs, chapel.truth.crf))
-    assert crf_rmse(crf, chapel.truth.crf).max() < 0.05
+COUNTS = {4: [1 / 30, 1 / 4, 2.5, 15], 16: 2.0 ** np.arange(-10, 6)}
+KINDS = list(itertools.product(FAMILIES, COUNTS))
+
+
+@cache
+def shot(family, count, jpeg=None):
+    """A bracket of a scene with 18.5 stops. A converter of 12 bits would leave no smooth truth in the dark."""
+    return FAMILIES[family](jpeg_quality=jpeg, bits=16).shoot(random_scene(5, (384, 576)), COUNTS[count])
+
+
+def opencvs(bracket, samples=70):
+    """OpenCV's CalibrateDebevec, called directly, on BGR as it is used to."""
+    bgr = [np.ascontiguousarray(image[..., ::-1]) for image in bracket.images]
+    response = cv2.createCalibrateDebevec(samples).process(bgr, bracket.times.astype(np.float32))
+    return np.log(response[:, 0, ::-1].T.astype(np.float64))
+
+
+@pytest.mark.parametrize("family, count", KINDS)
+def test_noise_hardly_moves_the_curve_by_a_tenth_of_what_it_does_to_opencvs(family, count):
+    bracket = shot(family, count)
+    ours, theirs = (crf_rmse(curve, bracket.truth.crf).mean() for curve in (recover_crf(bracket).crf, opencvs(bracket)))
+    assert ours <= theirs / 10
+
+
+@pytest.mark.parametrize("jpeg, factor", [(95, 2), (85, 1.5)])
+@pytest.mark.parametrize("family, count", KINDS)
+def test_with_jpeg_the_curve_is_nearer_to_the_truth_than_opencvs(family, count, jpeg, factor):
+    bracket = shot(family, count, jpeg)
+    ours, theirs = (crf_rmse(curve, bracket.truth.crf).mean() for curve in (recover_crf(bracket).crf, opencvs(bracket)))
+    assert ours <= theirs / factor
+
+
+def test_the_chapels_curve_is_nearer_to_the_truth_than_opencvs(chapel):
+    ours, theirs = (crf_rmse(curve, chapel.truth.crf) for curve in (recover_crf(chapel).crf, opencvs(chapel)))
+    assert np.all(ours < theirs / 5)
+    assert ours.max() < 0.02
+
+
+def test_more_photographs_pixels_and_noise_leave_the_standard_errors_honest():
+    # A standard error is a promise: the truth lies within it about 68 times of 100.
+    shares = []
+    for family, count in KINDS:
+        bracket = shot(family, count)
+        response = recover_crf(bracket)
+        others = np.flatnonzero((np.arange(256) >= 5) & (np.arange(256) <= 250) & (np.arange(256) != 128))
+        shares.append((np.abs(response.crf - bracket.truth.crf) <= response.errors)[:, others].mean())
+    assert 0.58 < np.mean(shares) < 0.8
+    assert min(shares) > 0.35
+
+
+def test_less_evidence_gives_larger_standard_errors():
+    whole = shot("video standards", 4)
+    few = thinned(whole, np.s_[::6, ::6])
+    seen = np.s_[:, 10:120]
+    assert np.median(recover_crf(few).errors[seen] / recover_crf(whole).errors[seen]) > 1.5
+    # Above 150 nothing was seen: what is said there is a guess, and says so.
+    dark = replace(whole, images=tuple(np.minimum(image, 150) for image in whole.images), truth=None)
+    errors = recover_crf(dark).errors
+    assert errors[:, 240].min() > 10 * errors[:, 100].max()
+
+
+def thinned(bracket, pixels, photographs=slice(None)):
+    images = tuple(np.ascontiguousarray(image[pixels]) for image in bracket.images[photographs])
+    return Bracket(images, bracket.times[photographs], bracket.names[photographs])
+
+
+def spread(curves):
+    """(3,) how far curves lie apart, RMS in stops over the values 5..250, the gauge removed."""
+    stops = np.array(curves)[..., 5:251] / np.log(2)
+    stops -= stops.mean(axis=2, keepdims=True)
+    return np.sqrt(np.mean((stops - stops.mean(axis=0)) ** 2, axis=(0, 2)))
+
+
+@pytest.mark.parametrize("jpeg", [None, 95])
+@pytest.mark.parametrize("family, count", KINDS)
+def test_the_curve_stays_where_size_half_or_photographs_change(family, count, jpeg):
+    bracket = shot(family, count, jpeg)
+    variants = [bracket, *(thinned(bracket, pixels) for pixels in (
+        np.s_[::2, ::2], np.s_[1::3, 1::3], np.s_[:192], np.s_[192:], np.s_[:, :288], np.s_[:, 288:]))]  # fmt: skip
+    variants += [thinned(bracket, np.s_[:], photographs) for photographs in (slice(1, None), slice(-1))]
+    ours = [recover_crf(variant).crf for variant in variants]
+    theirs = [opencvs(variant) for variant in variants] + [opencvs(bracket, samples) for samples in (50, 100, 150)]
+    assert np.mean(spread(ours)) <= np.mean(spread(theirs)) / 5
+
+
+def test_how_often_every_pixel_is_repeated_changes_nothing_in_the_smoothness():
+    bracket = shot("film", 4)
+    repeated = thinned(bracket, np.s_[np.repeat(np.arange(384), 3)])
+    assert spread([recover_crf(b).crf for b in (bracket, repeated)]).max() < 5e-4
+
+
+def test_what_is_masked_says_nothing(small_bracket):
+    h, w = small_bracket.images[0].shape[:2]
+    right = np.broadcast_to(np.arange(w) >= w // 3, (h, w))
+    rng = np.random.default_rng(0)
+    spoiled = tuple(
+        np.where(right[..., None], image, rng.integers(0, 256, image.shape, np.uint8)) for image in small_bracket.images
+    )
+    masked = recover_crf(replace(small_bracket, images=spoiled, valid=(right,) * len(spoiled)))
+    alone = recover_crf(thinned(small_bracket, np.s_[:, w // 3 :]))
+    np.testing.assert_allclose(masked.crf[:, 10:], alone.crf[:, 10:], atol=1e-9)
+
+
+def test_twice_the_times_leaves_the_curve_alone(small_bracket):
+    twice = replace(small_bracket, times=2 * small_bracket.times)
+    np.testing.assert_allclose(recover_crf(twice).crf, recover_crf(small_bracket).crf, atol=1e-9)
+
+
+def test_what_is_too_small_for_transfer_functions_is_solved_by_least_squares(chapel):
+    tiny = thinned(chapel, np.s_[::60, ::60])
+    response, whole = recover_crf(tiny), recover_crf(chapel)
+    assert "least squares" in response.method
+    assert "transfer" in whole.method
+    assert crf_rmse(response.crf, chapel.truth.crf).max() < 0.15
+    assert np.median(response.errors) > 3 * np.median(whole.errors)
+
+
+@pytest.mark.parametrize("value", [0, 255])
+def test_a_bracket_without_usable_pixels_is_refused(value):
+    images = tuple(np.full((20, 30, 3), value, np.uint8) for _ in range(3))
+    with pytest.raises(ValueError, match="No pixel has two different usable values"):
+        recover_crf(Bracket(images, np.array([1.0, 2, 4]), ("a", "b", "c")))
+
+
+@pytest.mark.parametrize("lam", [0, -1, np.nan])
+def test_a_smoothness_that_is_not_positive_is_refused(small_bracket, lam):
+    with pytest.raises(ValueError, match="lam must be positive; got"):
+        recover_crf(small_bracket, lam)
+
+
+def test_one_exposure_is_no_bracket(small_bracket):
+    with pytest.raises(BracketError, match="at least two photographs with different exposure times"):
+        Bracket(small_bracket.images[:1], small_bracket.times[:1], small_bracket.names[:1])
+
+
+def test_times_that_do_not_match_are_refused(small_bracket):
+    with pytest.raises(BracketError, match="there must be one of each for every exposure"):
+        Bracket(small_bracket.images, small_bracket.times[:-1], small_bracket.names)
 
 
 @pytest.mark.parametrize("lam", [1, 1e-3, 100])
@@ -204,10 +350,38 @@ def test_the_hat_of_the_paper():
     assert np.array_equal(hat_weights(), expected)
 
 
-def test_black_and_clipped_values_get_no_weight():
-    w = hat_weights(17, 250)
+GAMMA = 2.2 * np.log(np.maximum(np.arange(256), 0.5) / 128)
+SHAPES = {"hat": hat_weights, "gaussian": gaussian_weights, "uniform": uniform_weights,
+          "noise": partial(noise_weights, GAMMA)}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+def test_black_and_clipped_values_get_no_weight(shape):
+    w = shape(17, 250)
     assert np.flatnonzero(w).tolist() == list(range(18, 250))
-    assert np.all(np.diff(np.sign(np.diff(w[17:250]))) <= 0)  # up, then down
+    assert np.all(np.diff(np.sign(np.diff(w[18:250]))) <= 0)  # up, then down, or level
+
+
+def test_the_gaussian_is_that_of_robertson():
+    w = gaussian_weights()
+    expected = np.exp(-4 * (np.array([64, 127, 191]) - 127.5) ** 2 / 127.5**2)
+    np.testing.assert_allclose(w[[64, 127, 191]], expected)
+    np.testing.assert_allclose(w[1:255], w[254:0:-1])
+
+
+def test_noise_weights_are_the_error_in_light_of_one_pixel_value_turned_over():
+    w = noise_weights(GAMMA)
+    np.testing.assert_allclose(w[[50, 100, 200]] / w[100], [0.5, 1, 2], rtol=1e-3)  # of a gamma camera g' is 2.2 / z
+    flat = GAMMA.copy()
+    flat[100:120] = flat[100]
+    assert noise_weights(flat)[105] == 0
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+def test_every_shape_finds_the_curve_of_a_gamma_camera(shape):
+    Z, truth = gamma_samples(3000)
+    g, _ = gsolve(Z, B, 5, shape(4, 250))
+    assert np.abs(g - truth)[10:250].max() < 0.03
 
 
 @pytest.mark.parametrize("black", [0, 1, 17, 40])

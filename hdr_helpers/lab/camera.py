@@ -123,6 +123,31 @@ class Camera:
         return int(np.ceil(max(reach)))
 
 
+@dataclass(frozen=True)
+class StandardCamera(Camera):
+    """A camera whose channels follow sRGB, Rec. 709 and a plain power of 1 / 1.8: linear or steep in the dark."""
+
+    def respond(self, exposure, channel: int) -> np.ndarray:
+        x = np.clip(exposure, 0, 1)
+        if channel == 0:
+            return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+        if channel == 1:
+            return np.where(x <= 0.018, 4.5 * x, 1.099 * x**0.45 - 0.099)
+        return x ** (1 / 1.8)
+
+
+@dataclass(frozen=True)
+class FilmCamera(Camera):
+    """A camera with the S of film: powers of 1/2, 1/2.2 and 1/2.4, then half a smooth step; flat towards white."""
+
+    def respond(self, exposure, channel: int) -> np.ndarray:
+        y = np.clip(exposure, 0, 1) ** (1 / (2.0, 2.2, 2.4)[channel])
+        return (y + 3 * y**2 - 2 * y**3) / 2
+
+
+FAMILIES = {"between a power and a logarithm": Camera, "video standards": StandardCamera, "film": FilmCamera}
+
+
 def _differs(radiance, reference) -> np.ndarray:
     """(H, W) bool: where two moments of a scene differ by more than 1% in a channel."""
     return np.any(np.abs(radiance - reference) > 0.01 * reference, axis=2)

@@ -9,8 +9,8 @@ then g(u) - g(v) = ln r, whatever the scene. Two ways to it:
   next: the brightest fifth stays the brightest fifth (section 3);
 - from the joint histogram, where the photographs are aligned: the median of v where the other photograph reads u.
 
-A median is carried through any rising curve unharmed. Noise in the shorter exposure therefore moves it hardly,
-where it bends the least squares of Debevec and Malik, which takes every noisy value at its word.
+A median is carried through any rising curve unharmed. Noise in the shorter exposure therefore hardly moves it,
+while it bends the least squares of Debevec and Malik, which takes every noisy value at its word.
 """
 
 import numpy as np
@@ -28,6 +28,7 @@ MOST_BLACK, MOST_CLIPPED = 0.45, 0.05
 ROUNDING = 0.02  # pixel values by which a median of rounded values may be off, standard deviation
 MISFIT = 0.002  # by which g(u) - g(v) = ln r may fail for other reasons (shutter, interpolation), ln exposure
 BEND = 0.011  # by how much the local gamma dg / d ln z changes from a pixel value to the next
+NEAR = 8  # pixel values each way that a mean is taken over, so that what moved has no part in it
 LEAST_SLOPE = 1e-3  # of g, per pixel value
 ROUNDS = 3  # the errors of medians are counted in exposure, so they need the slope of g, which needs them
 FEWEST = 100  # equations
@@ -47,13 +48,14 @@ def intensity_mapping(first, second) -> np.ndarray:
     return np.where(below_first > np.sum(second[:-1]), 255.0, mapped)
 
 
-def brightness_transfer(joint, black: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def brightness_transfer(joint, black: int = 0) -> tuple[np.ndarray, ...]:
     """Pixel values that belong together in two aligned exposures.
 
     joint : (256, 256) counts of pixels that read u in the longer and v in the shorter photograph
     black : pixel value that stands for no light
-    Returns three (K,) arrays for the values that can be trusted: u, integers; the median of v, float64, with
-    fractions; and the variance of that median, float64, pixel values squared.
+    Returns for the K values that can be trusted: u, (K,) integers; the median of v, (K,) float64, with fractions;
+    the variance of that median, (K,) float64, pixel values squared; and the shares of pixels that read each v, (K, 256)
+    float64, 0 away from the median.
     """
     joint = np.asarray(joint, dtype=np.float64)
     count = joint.sum(axis=1)
@@ -70,7 +72,8 @@ def brightness_transfer(joint, black: int = 0) -> tuple[np.ndarray, np.ndarray, 
     trusted &= (seen[:, : black + 1].sum(axis=1) < MOST_BLACK) & (seen[:, -2:].sum(axis=1) < MOST_CLIPPED)
     # The variance of a median is pi / 2 times that of a mean.
     variance = np.pi / 2 * spread / count[u] + ROUNDING**2
-    return u[trusted], median[trusted], variance[trusted]
+    near = np.abs(v - median[:, None]) <= NEAR
+    return u[trusted], median[trusted], variance[trusted], (seen * near)[trusted]
 
 
 def response_from_transfers(
@@ -92,17 +95,19 @@ def response_from_transfers(
     Raises ValueError where the pairs say too little.
     """
     transfers = [brightness_transfer(joint, black) for joint in joints]
-    u, v, variance = (np.concatenate(parts) for parts in zip(*transfers, strict=True)) if transfers else 3 * ([],)
+    if not transfers:
+        raise ValueError("Not one pair of exposures was given.")
+    u, median, variance, seen = (np.concatenate(parts) for parts in zip(*transfers, strict=True))
     if len(u) < FEWEST:
         raise ValueError(
             f"The pairs of exposures give {len(u)} pixel values that belong together, fewer than {FEWEST}."
         )
     ratios = np.repeat(np.asarray(log_ratios, dtype=np.float64), [len(t[0]) for t in transfers])
-    A = _differences(u, v)
     bends = _bends(black) * (smoothness / BEND)
     prior = bends.T @ bends
-    slope = 1.5 / np.maximum(np.arange(LEVELS), 3)  # of some camera, for the first round
+    v, slope = median, 1.5 / np.maximum(np.arange(LEVELS), 3)  # of some camera, for the first round
     for _ in range(ROUNDS):
+        A = _differences(u, v)
         precision = 1 / (MISFIT**2 + np.interp(v, np.arange(LEVELS), slope) ** 2 * variance)
         weighted = A.multiply(precision[:, None]).tocsr()
         normal, pull = (weighted.T @ A).toarray() + prior, weighted.T @ ratios
@@ -111,6 +116,7 @@ def response_from_transfers(
         factor = scipy.linalg.cho_factor(normal * scale[:, None] * scale)
         g = scale * scipy.linalg.cho_solve(factor, scale * pull)
         slope = np.maximum(np.gradient(g), LEAST_SLOPE)
+        v = (median + _mean_light(seen, g)) / 2
 
     misfit = (precision @ ratios**2 - g @ pull) / len(u)  # 1 if the precisions were right
     # The pairs share photographs: there are as many pieces of news as photographs beside the first.
@@ -122,6 +128,16 @@ def response_from_transfers(
     )
     variances = covariance.diagonal() - 2 * covariance[MIDDLE] + covariance[MIDDLE, MIDDLE]
     return g - g[MIDDLE], np.sqrt(np.maximum(variances, 0))
+
+
+def _mean_light(seen, g) -> np.ndarray:
+    """The pixel value, with fractions, that stands for the mean light of what was seen.
+
+    Shot noise is skewed. A median lies a sixth of an electron below the light, some hundredths of a stop in the dark;
+    a mean takes every rounding and outlier along, upwards. Half way between errs least.
+    """
+    rising = np.maximum.accumulate(g) + 1e-9 * np.arange(LEVELS)
+    return np.interp(np.log(seen @ np.exp(rising) / seen.sum(axis=1)), rising, np.arange(LEVELS))
 
 
 def _differences(u, v):
