@@ -4,13 +4,23 @@ Every explorer draws into one Image widget, so nothing stacks up or flickers whe
 """
 
 import time
+from functools import partial
 
 import cv2
 import ipywidgets as widgets
 import numpy as np
 
 from hdr_helpers.align import bitmaps
-from hdr_helpers.crf import fitted_weights, gsolve, sample_pixels
+from hdr_helpers.crf import (
+    fitted_weights,
+    gaussian_weights,
+    gsolve,
+    hat_weights,
+    noise_weights,
+    recover_crf,
+    sample_pixels,
+    uniform_weights,
+)
 from hdr_helpers.lab.figures import (
     data_on_curve_figure,
     hand_figure,
@@ -97,7 +107,7 @@ def pyramid_walk(fixed, moving, reach) -> list[tuple[int, int]]:
 
 
 def crf_explorer(bracket, channel=1):
-    """The response curve from few or many samples, rough or smooth, with some exposures left out."""
+    """The response curve from few or many samples, rough or smooth, with other weights, with exposures left out."""
     lam = widgets.FloatLogSlider(50, base=10, min=-1, max=4, step=0.25, description="smoothness (lambda)", **CONTROL)
     n = widgets.SelectionSlider(
         options=[5, 10, 20, 50, 100, 200, 500, 1000], value=50, description="samples (N)", **CONTROL
@@ -107,13 +117,24 @@ def crf_explorer(bracket, channel=1):
         value=1, description="exposures", **CONTROL,
     )  # fmt: skip
 
-    weights = {every: fitted_weights(bracket.images[::every]) for _, every in every.options}
+    weight = widgets.Dropdown(
+        options=[("hat (Debevec)", "hat"), ("Gaussian (Robertson)", "gaussian"), ("uniform", "uniform"),
+                 ("1 / g' (Mitsunaga)", "noise"), ("hat to 0 and 255", "paper's hat")],
+        description="weights", **CONTROL,
+    )  # fmt: skip
+    g = recover_crf(bracket).crf[channel]
+    shapes = {"hat": hat_weights, "gaussian": gaussian_weights, "uniform": uniform_weights,
+              "noise": partial(noise_weights, g)}  # fmt: skip
+    weights = {
+        (name, e): fitted_weights(bracket.images[::e], shape=s) for name, s in shapes.items() for _, e in every.options
+    }
+    weights |= {("paper's hat", e): hat_weights() for _, e in every.options}
 
-    def draw(lam, n, every):
+    def draw(lam, n, weight, every):
         images, B = bracket.images[::every], bracket.log_times[::every]
         rows, cols = sample_pixels(images, n)
         Z = np.stack([image[rows, cols, channel] for image in images], axis=1)
-        g, log_E = gsolve(Z, B, lam, weights[every])
+        g, log_E = gsolve(Z, B, lam, weights[weight, every])
         title = f"{n} samples in {len(images)} photographs, lambda {lam:.3g}"
         picture = jpeg_bytes(data_on_curve_figure(Z, B, g, log_E, title))
         if bracket.truth is None:
@@ -121,7 +142,7 @@ def crf_explorer(bracket, channel=1):
         error = crf_rmse(g[None], bracket.truth.crf[channel][None])[0]
         return picture, f"error against the truth: <b>{error:.3f} stops</b> (RMS over values 5 to 250)"
 
-    return _explorer(draw, {"lam": lam, "n": n, "every": every})
+    return _explorer(draw, {"lam": lam, "n": n, "weight": weight, "every": every})
 
 
 def radiance_explorer(radiance):

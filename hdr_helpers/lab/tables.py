@@ -1,6 +1,15 @@
 """Tables that notebooks print, so that their cells show what is computed and not how it is laid out."""
 
 from hdr_helpers.lab.figures import seconds
+from hdr_helpers.lab.metrics import crf_rmse
+
+
+def print_crf_errors(curves: dict, truth) -> None:
+    """Root mean square error of curves, name -> (3, 256), over the values 5..250 in stops, the gauge removed."""
+    width = max(map(len, curves))
+    print(" " * width + "    red  green   blue")
+    for name, curve in curves.items():
+        print(f"{name:{width}} " + " ".join(f"{error:6.3f}" for error in crf_rmse(curve, truth)))
 
 
 def print_motions(times, motions: dict, alignment) -> None:

@@ -124,19 +124,69 @@ def crf_figure(crf, title="Response curve of the camera"):
     return fig
 
 
-def crf_error_figure(curves, truth, title):
+def joint_figure(joint, u, v, titles):
+    """How often two photographs read which pair of pixel values, and the pairs that belong together.
+
+    joint : (256, 256) counts of u in the longer and v in the shorter photograph; u, v : (K,) the pairs
+    titles : names of the longer and the shorter photograph
+    """
+    fig, (left, right) = new_figure(1, 2, 4.4)
+    for ax, (low, high) in ((left, (0, 255)), (right, (90, 130))):
+        ax.imshow(np.log1p(joint.T), origin="lower", cmap="Greys", aspect="auto")
+        ax.plot(u, v, color=THREE[0][0], lw=2 if ax is left else 0, marker="o" if ax is right else "", ms=4,
+                label="median of each column")  # fmt: skip
+        ax.set(xlabel=f"pixel value u at {titles[0]}", xlim=(low, high))
+        ax.legend(frameon=False, loc="upper left")
+    inside = (u >= 90) & (u <= 130)
+    left.set(ylabel=f"pixel value v at {titles[1]}", ylim=(0, 255))
+    right.set(ylim=(v[inside].min() - 12, v[inside].max() + 12))
+    left.set_title("all pixels of the green channel", fontsize=10)
+    right.set_title("a part of it: noise spreads v, its median stays", fontsize=10)
+    headline(fig, "Two exposures of one scene tie each pixel value to another one")
+    return fig
+
+
+def edges_figure(image, places, crf, truth):
+    """The pixels on soft edges that tell a response from one photograph, and that response.
+
+    image : (H, W, 3) uint8; places : (n, 2) rows and columns; crf, truth : (3, 256)
+    """
+    fig, (left, right) = new_figure(1, 2, 3.6, width_ratios=[1.4, 1])
+    bare(left)
+    left.imshow(image)
+    left.scatter(places[:, 1], places[:, 0], s=12, facecolor="none", edgecolor="white", lw=1.6)
+    left.scatter(places[:, 1], places[:, 0], s=12, facecolor="none", edgecolor=ACCENT, lw=0.9)
+    left.set_title(f"{len(places)} pixels that mix two plain colours", fontsize=10)
+    z = np.arange(5, 251)
+    for (name, colour, style, _), found, true in zip(CHANNELS, crf, truth, strict=True):
+        right.plot(z, found[z], style, color=colour, label=f"{name}, from the edges")
+        right.plot(z, true[z], color=colour, lw=0.8, alpha=0.6)
+    right.plot([], [], color=MUTED, lw=0.8, label="thin: the truth")
+    right.set(xlabel="pixel value Z", ylabel="log exposure g(Z)")
+    right.legend(frameon=False)
+    plain(right)
+    headline(fig, "A single photograph tells the response roughly, from the colours of its edges")
+    return fig
+
+
+def crf_error_figure(curves, truth, title, reach=0.42, errors=None):
     """Error of log inverse responses in stops against the pixel value, a panel for each channel.
 
     curves : name -> (3, 256); truth : (3, 256). The gauge, one constant a curve, is removed.
+    reach : stops that the axis shows up and down
+    errors : (3, 256) standard errors, ln exposure, drawn round 0; the gauge then is held at 128, as theirs is
     """
     fig, axes = new_figure(1, 3, 3.4, sharey=True)
     z = np.arange(5, 251)
+    if errors is not None:
+        for ax, error in zip(axes, errors[:, z] / np.log(2), strict=True):
+            ax.fill_between(z, -error, error, color=MUTED, alpha=0.35, lw=0, label="one standard error")
     for c, (ax, (name, *_)) in enumerate(zip(axes, CHANNELS, strict=True)):
         for (who, curve), (colour, style, _) in zip(curves.items(), THREE, strict=False):
             error = (curve[c, z] - truth[c, z]) / np.log(2)
-            ax.plot(z, error - error.mean(), style, color=colour, label=who)
+            ax.plot(z, error - (error.mean() if errors is None else 0), style, color=colour, label=who)
         ax.axhline(0, color=INK, lw=0.8)
-        ax.set(xlabel="pixel value Z", ylim=(-0.42, 0.42))
+        ax.set(xlabel="pixel value Z", ylim=(-reach, reach))
         ax.set_title(name, fontsize=10)
         plain(ax)
     axes[0].set_ylabel("error of g (stops)")
