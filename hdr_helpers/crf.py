@@ -28,7 +28,7 @@ from hdr_helpers._response.weights import (
     uniform_weights,
 )
 from hdr_helpers.load import Bracket, in_8_bits
-from hdr_helpers.papers.grossberg_nayar2003 import response_from_transfers
+from hdr_helpers.papers.grossberg_nayar2003 import TooLittleEvidence, response_from_transfers
 
 __all__ = [
     "LEVELS",
@@ -51,7 +51,7 @@ __all__ = [
 CHUNK = 1 << 16  # pixels worked on at a time
 FLOOR = 1e-4  # least weight of a smoothness row, so that values that no weight reaches stay defined
 SMOOTHNESS = 20.0  # lambda for 100 pixels
-EVIDENCE = 12_000_000  # pixel values of one channel that recover_crf looks at: 12 megapixels in 16 as 2 in 6
+EVIDENCE = 12_000_000  # pixels, all photographs together, that recover_crf looks at: of 12 megapixels in 16 one of 16
 # Pairs of exposures by which a response is recovered, in stops: nearer ones share too much noise, farther ones values.
 NEAREST, FARTHEST = 2.4, 6.6
 
@@ -188,7 +188,7 @@ def recover_crf(bracket: Bracket, lam: float = 1.0) -> Response:
     try:
         curves, errors = _by_transfers(images, bracket.log_times, lam, valid)
         method = "brightness transfer functions (Grossberg and Nayar 2003)"
-    except ValueError:
+    except TooLittleEvidence:
         curves, errors = _by_least_squares(bracket, lam)
         method = "least squares (Debevec and Malik 1997)"
     # Noise can leave a dip where few pixels speak; a response never falls (section 2.1).

@@ -34,6 +34,10 @@ ROUNDS = 3  # the errors of medians are counted in exposure, so they need the sl
 FEWEST = 100  # equations
 
 
+class TooLittleEvidence(ValueError):
+    """Photographs that say too little of each other for a response."""
+
+
 def intensity_mapping(first, second) -> np.ndarray:
     """What each pixel value of one photograph becomes in another of the same scene (section 3).
 
@@ -92,14 +96,14 @@ def response_from_transfers(
     ratio changes nothing, section 4) the smoothness decides.
     Returns g, (256,) float64 with g[128] = 0, and its standard error, (256,) float64, 0 at 128: of the difference
     g(z) - g(128), from the inverse of the same normal equations.
-    Raises ValueError where the pairs say too little.
+    Raises TooLittleEvidence where the pairs say too little.
     """
     transfers = [brightness_transfer(joint, black) for joint in joints]
     if not transfers:
-        raise ValueError("Not one pair of exposures was given.")
+        raise TooLittleEvidence("Not one pair of exposures was given.")
     u, median, variance, seen = (np.concatenate(parts) for parts in zip(*transfers, strict=True))
     if len(u) < FEWEST:
-        raise ValueError(
+        raise TooLittleEvidence(
             f"The pairs of exposures give {len(u)} pixel values that belong together, fewer than {FEWEST}."
         )
     ratios = np.repeat(np.asarray(log_ratios, dtype=np.float64), [len(t[0]) for t in transfers])
