@@ -22,7 +22,7 @@ from hdr_helpers.crf import (
     uniform_weights,
 )
 from hdr_helpers.load import Bracket, BracketError, Truth, load_bracket
-from hdr_helpers.merge import clipping, merge_debevec, write_hdr
+from hdr_helpers.merge import Merged, clipping, merge_debevec, write_hdr
 from hdr_helpers.tonemap import dynamic_range_stops, tonemap, write_picture
 
 # OpenCV prints notes for its own developers to stderr, when it tone-maps and when it can't read a file; a student
@@ -35,6 +35,7 @@ __all__ = [
     "BracketError",
     "Ghosts",
     "Match",
+    "Merged",
     "Response",
     "Truth",
     "align_mtb",

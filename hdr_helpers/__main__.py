@@ -122,7 +122,9 @@ def _run(bracket: Bracket, out: Path, options) -> None:
     response = recover_crf(aligned, lam=options.lam)
     crf, errors = response.crf, response.errors
     print(f"The response is recovered by {response.method}.")
-    radiance = merge_debevec(aligned.images, aligned.times, crf, valid=aligned.valid)
+    merged = merge_debevec(aligned.images, aligned.times, crf, valid=aligned.valid)
+    radiance = merged.radiance
+    print(f"Photographs are weighted by {merged.weighting}.")
     print(f"Dynamic range of the scene: {dynamic_range_stops(radiance):.1f} stops (99.9th over 0.1th percentile).")
     picture = tonemap(radiance, options.tonemap)
 

@@ -16,7 +16,8 @@ import numpy as np
 import scipy.linalg
 
 from hdr_helpers._response import LEVELS, MIDDLE
-from hdr_helpers._response.clipping import black_level, whole_white
+from hdr_helpers._response.clipping import CLIPPED, RINGING, black_level, whole_white
+from hdr_helpers._response.evidence import evidence, joint_histograms
 from hdr_helpers._response.samples import sample_pixels
 from hdr_helpers._response.weights import (
     NOISE,
@@ -31,16 +32,21 @@ from hdr_helpers.load import Bracket, in_8_bits
 from hdr_helpers.papers.grossberg_nayar2003 import TooLittleEvidence, response_from_transfers
 
 __all__ = [
+    "CLIPPED",
     "LEVELS",
     "MIDDLE",
+    "NOISE",
+    "RINGING",
     "Response",
     "black_level",
     "checked_weights",
     "crf_opencv",
+    "evidence",
     "fitted_weights",
     "gaussian_weights",
     "gsolve",
     "hat_weights",
+    "joint_histograms",
     "noise_weights",
     "recover_crf",
     "sample_pixels",
@@ -51,7 +57,6 @@ __all__ = [
 CHUNK = 1 << 16  # pixels worked on at a time
 FLOOR = 1e-4  # least weight of a smoothness row, so that values that no weight reaches stay defined
 SMOOTHNESS = 20.0  # lambda for 100 pixels
-EVIDENCE = 12_000_000  # pixels, all photographs together, that recover_crf looks at: of 12 megapixels in 16 one of 16
 # Pairs of exposures by which a response is recovered, in stops: nearer ones share too much noise, farther ones values.
 NEAREST, FARTHEST = 2.4, 6.6
 
@@ -175,18 +180,14 @@ def recover_crf(bracket: Bracket, lam: float = 1.0) -> Response:
 
     Brightness transfer functions take the whole image's evidence and are not bent by noise
     (papers/grossberg_nayar2003.py). Where there is too little of it for them, the paper's least squares has to do.
-    Of large brackets every second, third ... pixel each way speaks, so that EVIDENCE values do.
+    Of large brackets every second, third ... pixel each way speaks (_response/evidence.py).
     Returns a Response. Its curves nowhere fall.
     Raises ValueError where nothing ties one pixel value to another, or lam is not positive.
     """
     if not lam > 0:
         raise ValueError(f"lam must be positive; got {lam}.")
-    step = int(np.ceil(np.sqrt(bracket.images[0][..., 0].size * len(bracket) / EVIDENCE)))
-    few = np.s_[::step, ::step]
-    images = [in_8_bits(image[few]) for image in bracket.images]
-    valid = None if bracket.valid is None else [mask[few] for mask in bracket.valid]
     try:
-        curves, errors = _by_transfers(images, bracket.log_times, lam, valid)
+        curves, errors = _by_transfers(bracket, lam)
         method = "brightness transfer functions (Grossberg and Nayar 2003)"
     except TooLittleEvidence:
         curves, errors = _by_least_squares(bracket, lam)
@@ -196,26 +197,18 @@ def recover_crf(bracket: Bracket, lam: float = 1.0) -> Response:
     return Response(curves - curves[:, MIDDLE : MIDDLE + 1], errors, method)
 
 
-def _by_transfers(images, log_times, lam, valid):
+def _by_transfers(bracket, lam):
     """Curves and errors from the joint histograms of pairs of photographs, each (3, 256)."""
-    stops = (log_times[None] - log_times[:, None]) / np.log(2)
-    pairs = np.argwhere((stops > NEAREST) & (stops < FARTHEST))  # shorter, longer
-    if len(np.unique(pairs)) < len(images):  # photographs close to each other are better than none
+    stops = (bracket.log_times[:, None] - bracket.log_times) / np.log(2)
+    pairs = np.argwhere((stops > NEAREST) & (stops < FARTHEST))  # longer, shorter
+    if len(np.unique(pairs)) < len(bracket):  # photographs close to each other are better than none
         pairs = np.argwhere((stops > 0) & (stops < FARTHEST))
-    masks = [None if valid is None else (valid[j] & valid[k]).view(np.uint8) for k, j in pairs]
-    ratios = [log_times[j] - log_times[k] for k, j in pairs]
-    black = black_level(images, valid)
+    images, masks = evidence(bracket.images, bracket.valid)
+    joints, ratios = joint_histograms(images, masks, pairs), stops[tuple(pairs.T)] * np.log(2)
+    black = black_level(images, bracket.valid and masks)
     black = black if black > NOISE else 0  # a value or two is rounding, not a level
-
-    def channel(c):
-        planes = [np.ascontiguousarray(image[..., c]) for image in images]
-        joints = [
-            cv2.calcHist([planes[j], planes[k]], [0, 1], mask, [LEVELS, LEVELS], [0, LEVELS, 0, LEVELS])
-            for (k, j), mask in zip(pairs, masks, strict=True)
-        ]
-        return response_from_transfers(joints, ratios, len(images), lam, black)
-
-    return np.stack([channel(c) for c in range(3)], axis=1)
+    curves = [response_from_transfers(joints[:, c], ratios, len(bracket), lam, black) for c in range(3)]
+    return np.stack(curves, axis=1)
 
 
 def _by_least_squares(bracket, lam):

@@ -3,8 +3,8 @@
 After Debevec and Malik 1997, equation 6: the log irradiance of a pixel is the weighted mean of what each
 photograph says of it, ln E = sum_j w(Z_j) (g(Z_j) - ln dt_j) / sum_j w(Z_j).
 
-Both sums depend on a photograph only through its pixel value, so each is a table of 256 entries a
-channel, and merging is looking up and adding.
+Both sums depend on a photograph only through its pixel value, so merging is looking up and adding; that, and what the
+photographs say of their own noise, is in the rooms of _merging/.
 """
 
 import os
@@ -14,13 +14,30 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hdr_helpers.crf import LEVELS, checked_weights, fitted_weights, whole_white
+from hdr_helpers._merging.noise import exposure_variance, frayed_white
+from hdr_helpers._merging.tables import mean_by_tables
+from hdr_helpers.crf import CLIPPED, LEVELS, NOISE, black_level, evidence, fitted_weights, joint_histograms
 from hdr_helpers.load import in_8_bits
 
-LAST_RESORT = 1e-5  # of the largest weight: decides only where no photograph has any other weight
+LAST_RESORT = 1e-3  # of the least weight: decides only where no photograph has any other weight
 NEXT_RESORT = 1e-4  # by how much less the next photograph decides, where the nearest bound is not valid
-LEAST = 1e-35  # of the largest weight: no sum of weights is 0, however many photographs
-TILE_ROWS = 64  # rows merged at a time: the working arrays stay in the processor's cache
+LEAST = 1e-30  # of the largest weight: no sum of weights is 0, and no product so small that processors take long
+
+
+@dataclass(frozen=True, eq=False)
+class Merged:
+    """A radiance map, and what to know of it.
+
+    radiance : (H, W, 3) float32, RGB, relative, finite and positive everywhere
+    too_bright, too_dark : number of pixels in which a channel was clipped, or black, in every photograph that has a
+        say there: their radiance is a bound, not a measurement
+    weighting : for people, what the photographs were weighted by
+    """
+
+    radiance: np.ndarray
+    too_bright: int
+    too_dark: int
+    weighting: str
 
 
 @dataclass(frozen=True)
@@ -53,21 +70,108 @@ def clipping(images, valid=None) -> Clipping:
     return Clipping(*shares, float(dark.all(axis=0).mean()), float(bright.all(axis=0).mean()))
 
 
-def merge_debevec(images, times, crf, w=None, valid=None) -> np.ndarray:
-    """Radiance map from a bracket and the camera's response (equation 6, one channel at a time).
+def merge_debevec(images, times, crf, w=None, valid=None, mean: str | None = None) -> Merged:
+    """Radiance map from a bracket and the camera's response: a weighted mean of what each photograph says.
 
     images : P arrays (H, W, 3), RGB, all uint8 or all uint16
     times : (P,) exposure times in seconds
     crf : (3, 256) float, log inverse response of each channel; for 16 bits it is interpolated
-    w : (256,) float, weight of each pixel value; None takes fitted_weights(images)
+    w : weight of each pixel value, (256,), (3, 256), (P, 1, 256) or (P, 3, 256) float, none negative. None takes
+        1 / variance by the noise that the bracket itself shows (_merging/noise.py), and takes almost white pixels
+        that touch white for clipped where white is frayed, as by JPEG
     valid : P arrays (H, W) bool, False where a photograph has no say; None lets all speak everywhere
+    mean : of what. "log", equation 6: of ln E. Errors count as shares, but noise in the dark, whose logarithm falls
+        farther than it rises, pulls down, and a value of 0 can't be used. "linear": of E. True on average in the
+        dark, but a short exposure's noise is divided by a short time, so weights have to grow with its square.
+        "log1p": of ln(1 + E T), T the longest time: the one where errors are shares, the other where they are not.
+        None takes "log1p" with the weights by noise and "log" with given ones
 
-    Returns radiance, (H, W, 3) float32, RGB, relative, finite and positive everywhere. A pixel that is
-    clipped in every photograph gets what the shortest exposure says, one that is black in every photograph
-    what the longest says: the nearest bound, so that the brightest part of a scene stays the brightest. Where
-    no photograph is valid it is as dark as the darkest pixel.
+    Returns a Merged. Where no weight is above 0 a pixel gets the nearest bound: what the shortest exposure says if it
+    is clipped in all of them, what the longest says if it is black, so that the brightest part of a scene stays the
+    brightest. Where no photograph is valid it is as dark as the darkest pixel.
     Raises ValueError where shapes or values don't fit.
     """
+    images, times, crf, w, valid = _checked(images, times, crf, w, valid)
+    mean = mean or ("log1p" if w is None else "log")
+    if mean not in MEANS:
+        raise ValueError(f"mean must be one of {', '.join(MEANS)}; got {mean!r}.")
+    settle, weighting = False, "the given weights"
+    if w is None:
+        w, settle = _weights_by_noise(images, times, crf, valid, mean)
+        weighting = "the noise that the photographs show" + (
+            ", clipped pixels that are not quite white left out" * settle
+        )
+    said, finish = MEANS[mean](np.exp(_to_depth(crf, images)), times)
+    weights, least = _with_last_resorts(_to_depth(w, images))
+    to_tables = (0, 2, 1)  # (P, values, 3)
+    radiance, too_bright, too_dark = mean_by_tables(
+        images, said.transpose(to_tables), weights.transpose(to_tables), finish, valid, settle, least
+    )
+    if valid is not None and (nowhere := np.isnan(radiance)).any():
+        np.copyto(radiance, 1 if nowhere.all() else np.nanmin(radiance, axis=(0, 1)), where=nowhere)
+    return Merged(radiance, too_bright, too_dark, weighting)
+
+
+def _log(X, times):
+    return np.log(X) - np.log(times)[:, None, None], lambda mean: np.exp(mean, out=mean)
+
+
+def _linear(X, times):
+    return X / times[:, None, None], lambda mean: mean
+
+
+def _log1p(X, times):
+    longest = times[-1]
+    return np.log1p(X * longest / times[:, None, None]), lambda mean: np.divide(
+        np.expm1(mean, out=mean), np.float32(longest), out=mean
+    )
+
+
+# What a photograph of each time says of a pixel, from its exposure X (3, values), and the way back from the mean.
+MEANS = {"log": _log, "linear": _linear, "log1p": _log1p}
+
+
+def _weights_by_noise(images, times, crf, valid, mean):
+    """1 / variance of what is averaged, (P, 3, 256), and whether clipped pixels hide behind other values than white."""
+    few, masks = evidence(images, valid)
+    joints = joint_histograms(few, masks, [(k, k + 1) for k in range(len(few) - 1)])
+    frayed = frayed_white(joints, np.log(times), crf)
+    X, share = np.exp(crf), (times / times[-1])[:, None, None]
+    # The slope of what is averaged against X: of ln X, of X / t, of ln(1 + X T / t).
+    slope = {"log": 1 / X, "linear": 1 / share, "log1p": 1 / (X + share)}[mean]
+    w = np.broadcast_to(
+        1 / (slope**2 * exposure_variance(joints, np.log(times), crf)), (len(images), *crf.shape)
+    ).copy()
+    w[..., CLIPPED if frayed else LEVELS - 1 :] = 0
+    black = black_level(few, valid and masks)
+    if black > NOISE or mean == "log":
+        w[..., : black + 1] = 0
+    return w, frayed
+
+
+def _with_last_resorts(w):
+    """Weights, highest 1, with the nearest bounds in place of zeros; and the sum from which on a pixel was measured."""
+    photographs, _, values = w.shape
+    w = w / w.max()
+    least = w[w > 0].min()
+    # Where no photograph is usable the nearest bound decides: of the bright values the shortest exposure's, of the
+    # dark ones the longest's; where that one is not valid, the next one's.
+    from_shortest = np.arange(photographs)[:, None]
+    nearest = np.where(np.arange(values) >= values // 2, from_shortest, photographs - 1 - from_shortest)
+    resort = np.maximum(least * LAST_RESORT * NEXT_RESORT**nearest, LEAST)[:, None]
+    return np.maximum(w, resort), least / 2
+
+
+def _to_depth(curves, images):
+    """Curves over 256 values, (..., 256), over the 65,536 between them where images have 16 bits."""
+    if images[0].dtype == np.uint8:
+        return curves
+    z = np.linspace(0, LEVELS - 1, np.iinfo(images[0].dtype).max + 1)
+    return np.apply_along_axis(lambda curve: np.interp(z, np.arange(LEVELS), curve), -1, curves)
+
+
+def _checked(images, times, crf, w, valid):
+    """The arguments as arrays, shortest exposure first, w as (P, 3, 256) or None; ValueError where they don't fit."""
     images, times, crf = list(images), np.asarray(times, dtype=np.float64), np.asarray(crf, dtype=np.float64)
     if len(images) != len(times) or not len(images):
         raise ValueError(f"One exposure time for each photograph is needed; got {len(times)} for {len(images)}.")
@@ -82,50 +186,13 @@ def merge_debevec(images, times, crf, w=None, valid=None) -> np.ndarray:
     if valid is not None and [np.shape(mask) for mask in valid] != [image.shape[:2] for image in images]:
         raise ValueError(f"valid must hold one mask of {images[0].shape[:2]} for each photograph.")
     order = np.argsort(times)
-    images, times = [images[i] for i in order], times[order]
+    if w is not None:
+        w = np.asarray(w, dtype=np.float64)
+        if w.shape[-1:] != (LEVELS,) or not np.all(np.isfinite(w)) or w.min() < 0 or not w.max() > 0:
+            raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+        w = np.broadcast_to(w, (len(images), 3, LEVELS))[order]
     valid = None if valid is None else [np.asarray(valid[i], dtype=bool) for i in order]
-    w = fitted_weights(images, valid) if w is None else checked_weights(w)
-    # In the shortest exposure even a doubtful value is better than none: nothing sees more.
-    masks = valid or [None] * len(images)
-    settled = [images[0], *map(whole_white, images[1:], masks[1:])]
-    values = np.iinfo(images[0].dtype).max + 1
-    radiance = _merge_by_tables(settled, *_tables(times, crf, w, values), masks)
-    if valid is not None and not (somewhere := np.logical_or.reduce(valid)).all():
-        radiance[~somewhere] = radiance[somewhere].min(axis=0) if somewhere.any() else 1
-    return radiance
-
-
-def _tables(times, crf, w, values: int) -> tuple[np.ndarray, np.ndarray]:
-    """w(z) (g(z) - ln dt) and w(z) for every photograph, each (P, 1, values, 3) float32 as cv2.LUT wants it.
-
-    times : ascending
-    """
-    z = np.linspace(0, LEVELS - 1, values)  # 256 values, or 65,536 between them
-    crf, w = np.array([np.interp(z, np.arange(LEVELS), g) for g in crf]), np.interp(z, np.arange(LEVELS), w)
-    # Where no photograph is usable the nearest bound decides: of the bright values the shortest exposure's, of the
-    # dark ones the longest's; where that one is not valid, the next one's.
-    from_shortest = np.arange(len(times))[:, None]
-    from_longest = len(times) - 1 - from_shortest
-    nearest = np.where(np.arange(values) >= values // 2, from_shortest, from_longest)
-    weights = np.maximum(w / w.max(), np.maximum(LAST_RESORT * NEXT_RESORT**nearest, LEAST))
-    weighted = weights[..., None] * (crf.T - np.log(times)[:, None, None])
-    weights = np.repeat(weights[..., None], 3, axis=2)
-    return tuple(np.ascontiguousarray(t[:, None], dtype=np.float32) for t in (weighted, weights))
-
-
-def _merge_by_tables(images, weighted, weights, masks) -> np.ndarray:
-    """Look up and add, some rows at a time; equation 6 and the exponential at the end. NaN where none is valid."""
-    radiance = np.empty(images[0].shape, dtype=np.float32)
-    for top in range(0, len(radiance), TILE_ROWS):
-        rows = np.s_[top : top + TILE_ROWS]
-        numerator = np.zeros_like(radiance[rows])
-        denominator = np.zeros_like(radiance[rows])
-        for j, image in enumerate(images):
-            mask = None if masks[j] is None else masks[j][rows].view(np.uint8)
-            cv2.accumulate(cv2.LUT(image[rows], weighted[j]), numerator, mask)
-            cv2.accumulate(cv2.LUT(image[rows], weights[j]), denominator, mask)
-        cv2.exp(cv2.divide(numerator, denominator), radiance[rows])
-    return radiance
+    return [images[i] for i in order], times[order], crf, w, valid
 
 
 def merge_opencv(images, times, crf=None) -> np.ndarray:
@@ -143,16 +210,30 @@ def merge_opencv(images, times, crf=None) -> np.ndarray:
 
 
 def write_hdr(path, radiance) -> None:
-    """Write a radiance map as Radiance RGBE (.hdr), which other HDR programs read.
+    """Write a radiance map as Radiance RGBE (.hdr) or, where OpenCV was built with it, OpenEXR (.exr).
 
-    radiance : (H, W, 3) float, RGB. The file is complete or not there. RGBE keeps about 1% of the strongest
-    channel; keep radiance itself (np.save) where more is wanted.
+    radiance : (H, W, 3) float, RGB, finite and not negative. The file is complete or not there. RGBE keeps about 1% of
+    the strongest channel; OpenEXR (32-bit) all of it. np.save keeps it, too, where only Python is to read it.
+    Raises ValueError where the radiance can't be stored, or the format is not one of these.
     """
-    path = Path(path)
-    done, data = cv2.imencode(".hdr", np.ascontiguousarray(radiance[..., ::-1], dtype=np.float32))
+    path, radiance = Path(path), np.asarray(radiance)
+    if radiance.ndim != 3 or radiance.shape[2] != 3 or not np.all(np.isfinite(radiance)) or radiance.min() < 0:
+        raise ValueError(f"{path}: a radiance map is (H, W, 3), finite and not negative; got shape {radiance.shape}.")
+    suffix = path.suffix.lower()
+    if suffix not in (".hdr", ".exr") or not cv2.haveImageWriter(f"radiance{suffix}"):
+        raise ValueError(f"{path}: this OpenCV writes radiance maps as {' and '.join(radiance_formats())}.")
+    try:
+        done, data = cv2.imencode(suffix, np.ascontiguousarray(radiance[..., ::-1], dtype=np.float32))
+    except cv2.error:
+        done = False
     if not done:
         raise ValueError(f"{path}: OpenCV could not write this radiance map of shape {radiance.shape}.")
     write_whole(path, data.tobytes())
+
+
+def radiance_formats() -> list[str]:
+    """The suffixes of files that write_hdr can write with this OpenCV."""
+    return [suffix for suffix in (".hdr", ".exr") if cv2.haveImageWriter(f"radiance{suffix}")]
 
 
 def write_whole(path, data: bytes) -> None:

@@ -20,7 +20,7 @@ TIMES = [float(t) for t in HANDHELD_TIMES]
 
 
 def merged(bracket, crf):
-    return merge_debevec(bracket.images, bracket.times, crf, valid=bracket.valid)
+    return merge_debevec(bracket.images, bracket.times, crf, valid=bracket.valid).radiance
 
 
 @pytest.fixture(scope="module")

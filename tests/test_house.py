@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 STAGES = ["load", "align", "crf", "merge", "tonemap"]
+ROOMS = {"_reading": "load", "_registering": "align", "_response": "crf", "_merging": "merge"}  # behind which stage
 
 
 def imports(path):
@@ -31,18 +32,14 @@ def test_a_stage_imports_only_numbers_and_earlier_stages(stage):
     earlier = {f"hdr_helpers.{name}" for name in STAGES[: STAGES.index(stage)]}
     for module in imports(ROOT / "hdr_helpers" / f"{stage}.py"):
         if module.startswith("hdr_helpers"):
-            behind = {
-                "load": ["hdr_helpers._reading"],
-                "align": ["hdr_helpers._registering"],
-                "crf": ["hdr_helpers._response"],
-            }
-            rooms = ("hdr_helpers.papers", *behind.get(stage, []))
+            behind = [f"hdr_helpers.{rooms}" for rooms, owner in ROOMS.items() if owner == stage]
+            rooms = ("hdr_helpers.papers", *behind)
             assert module in earlier or module.startswith(rooms)
         else:
             assert module.split(".")[0] not in {"matplotlib", "IPython", "ipywidgets", "nbgrader"}
 
 
-@pytest.mark.parametrize("behind, stage", [("_reading", "load"), ("_registering", "align"), ("_response", "crf")])
+@pytest.mark.parametrize("behind, stage", ROOMS.items())
 def test_a_room_behind_a_stage_imports_only_its_neighbours_earlier_stages_and_papers(behind, stage):
     rooms = list((ROOT / "hdr_helpers" / behind).glob("*.py"))
     earlier = {f"hdr_helpers.{name}" for name in STAGES[: STAGES.index(stage)]}

@@ -235,7 +235,9 @@ def test_what_stands_in_borders_does_not_reach_the_response(bordered, kind):
 @KINDS
 def test_what_stands_in_borders_does_not_reach_the_radiance_map(bordered, kind):
     crf = bordered.truth.crf
-    plain, other = (merge_debevec(b.images, b.times, crf, valid=b.valid) for b in (bordered, garbage(bordered, kind)))
+    plain, other = (
+        merge_debevec(b.images, b.times, crf, valid=b.valid).radiance for b in (bordered, garbage(bordered, kind))
+    )
     assert np.array_equal(plain, other)
 
 
@@ -249,8 +251,8 @@ def test_what_stands_in_borders_does_not_reach_the_clipped_shares(bordered, kind
 
 def test_pixels_that_are_valid_in_all_photographs_merge_as_without_masks(bordered):
     crf = bordered.truth.crf
-    masked = merge_debevec(bordered.images, bordered.times, crf, valid=bordered.valid)
-    plain = merge_debevec(bordered.images, bordered.times, crf)
+    masked = merge_debevec(bordered.images, bordered.times, crf, valid=bordered.valid).radiance
+    plain = merge_debevec(bordered.images, bordered.times, crf).radiance
     # Beside a border a pixel has lost the neighbour that might have told that it is clipped.
     inside = cv2.erode(np.logical_and.reduce(bordered.valid).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     assert 0.5 < inside.mean() < 0.95
@@ -259,14 +261,14 @@ def test_pixels_that_are_valid_in_all_photographs_merge_as_without_masks(bordere
 
 def test_masks_that_leave_nothing_out_change_nothing(small_bracket):
     crf, everywhere = small_bracket.truth.crf, [np.ones((120, 160), bool)] * 5
-    masked = merge_debevec(small_bracket.images, small_bracket.times, crf, valid=everywhere)
-    assert np.array_equal(masked, merge_debevec(small_bracket.images, small_bracket.times, crf))
+    masked = merge_debevec(small_bracket.images, small_bracket.times, crf, valid=everywhere).radiance
+    assert np.array_equal(masked, merge_debevec(small_bracket.images, small_bracket.times, crf).radiance)
 
 
 def test_a_pixel_in_a_border_is_what_the_other_photographs_say(bordered):
-    radiance = merge_debevec(bordered.images, bordered.times, bordered.truth.crf, valid=bordered.valid)
+    radiance = merge_debevec(bordered.images, bordered.times, bordered.truth.crf, valid=bordered.valid).radiance
     # There the first photograph has its border; the others alone must give the same.
-    rest = merge_debevec(bordered.images[1:], bordered.times[1:], bordered.truth.crf, valid=bordered.valid[1:])
+    rest = merge_debevec(bordered.images[1:], bordered.times[1:], bordered.truth.crf, valid=bordered.valid[1:]).radiance
     alone = ~bordered.valid[0] & np.logical_or.reduce(bordered.valid[1:])
     well_exposed = alone & ((bordered.images[1] > 20) & (bordered.images[1] < 200)).all(axis=2)
     assert well_exposed.sum() > 100
@@ -274,7 +276,7 @@ def test_a_pixel_in_a_border_is_what_the_other_photographs_say(bordered):
 
 
 def test_a_pixel_that_no_photograph_shows_is_no_brighter_than_the_darkest(bordered):
-    radiance = merge_debevec(bordered.images, bordered.times, bordered.truth.crf, valid=bordered.valid)
+    radiance = merge_debevec(bordered.images, bordered.times, bordered.truth.crf, valid=bordered.valid).radiance
     seen = np.logical_or.reduce(bordered.valid)
     assert (~seen).sum() >= 12
     assert np.all(np.isfinite(radiance)) and np.all(radiance > 0)
@@ -283,7 +285,7 @@ def test_a_pixel_that_no_photograph_shows_is_no_brighter_than_the_darkest(border
 
 def test_where_nothing_at_all_is_valid_the_radiance_is_finite_and_positive(small_bracket):
     nowhere = [np.zeros((120, 160), bool)] * 5
-    radiance = merge_debevec(small_bracket.images, small_bracket.times, small_bracket.truth.crf, valid=nowhere)
+    radiance = merge_debevec(small_bracket.images, small_bracket.times, small_bracket.truth.crf, valid=nowhere).radiance
     assert np.all(np.isfinite(radiance)) and np.all(radiance > 0)
 
 
@@ -335,7 +337,7 @@ def test_the_memorial_is_nearer_to_its_published_radiance_map_with_masks(real):
     known_there = reference > 0
 
     def agreement(bracket):
-        radiance = merge_debevec(bracket.images, bracket.times, recover_crf(bracket).crf, valid=bracket.valid)
+        radiance = merge_debevec(bracket.images, bracket.times, recover_crf(bracket).crf, valid=bracket.valid).radiance
         logs = np.log(luminance(radiance)[known_there]), np.log(reference[known_there])
         return np.corrcoef(*logs)[0, 1]
 
@@ -355,13 +357,15 @@ def in_16_bits(bracket):
 @pytest.mark.parametrize("curve", ["true", "recovered"])
 def test_16_bits_that_hold_8_merge_as_8_bits(small_bracket, curve):
     crf = small_bracket.truth.crf if curve == "true" else recover_crf(small_bracket).crf
-    in_8, in_16 = (merge_debevec(b.images, b.times, crf) for b in (small_bracket, in_16_bits(small_bracket)))
+    in_8, in_16 = (merge_debevec(b.images, b.times, crf).radiance for b in (small_bracket, in_16_bits(small_bracket)))
     np.testing.assert_allclose(in_16, in_8, rtol=1e-6)
 
 
 def test_masks_work_on_16_bits_as_on_8(bordered):
     crf = bordered.truth.crf
-    in_8, in_16 = (merge_debevec(b.images, b.times, crf, valid=b.valid) for b in (bordered, in_16_bits(bordered)))
+    in_8, in_16 = (
+        merge_debevec(b.images, b.times, crf, valid=b.valid).radiance for b in (bordered, in_16_bits(bordered))
+    )
     np.testing.assert_allclose(in_16, in_8, rtol=1e-6)
 
 
@@ -383,7 +387,8 @@ def test_16_bits_are_nearer_to_the_truth_than_8(fine):
     rounded = [np.rint(image / 257).astype(np.uint8) for image in bracket.images]
     crf = Camera().crf()
     error_8, error_16 = (
-        radiance_error(merge_debevec(images, bracket.times, crf), radiance) for images in (rounded, bracket.images)
+        radiance_error(merge_debevec(images, bracket.times, crf).radiance, radiance)
+        for images in (rounded, bracket.images)
     )
     assert error_16.median < error_8.median
     assert error_16.p95 < error_8.p95

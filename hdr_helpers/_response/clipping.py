@@ -7,6 +7,7 @@ from hdr_helpers._response import LEVELS
 from hdr_helpers.load import in_8_bits
 
 CLIPPED = 250  # from here on a pixel value may be a clipped one, pulled down by noise or JPEG
+DARKER = 0.1  # share of pixels that may be darker than half of a black level
 RINGING = 20  # grey levels by which JPEG pulls a clipped pixel below white where white ends
 
 
@@ -16,7 +17,8 @@ def black_level(images, valid=None) -> int:
     images : P arrays (H, W, 3) uint8 or uint16 (in 8 bits), aligned, shortest exposure first
     valid : P arrays (H, W) bool, the pixels that count, or None for all
     It is the largest dark value that the next longer exposure does not brighten. Up to there a pixel says
-    nothing of the scene, yet each of the short exposures would say it with conviction.
+    nothing of the scene, yet each of the short exposures would say it with conviction. Where darker values are common
+    it is noise round 0 and no level.
     """
     if len(images) < 2:
         return 0
@@ -29,7 +31,8 @@ def black_level(images, valid=None) -> int:
     median = np.argmax(np.cumsum(joint, axis=1) >= count[:, None] / 2, axis=1)
     dark = np.arange(LEVELS) < LEVELS // 4
     still = dark & (count > 1e-3 * count.sum()) & (median <= np.arange(LEVELS))
-    return int(np.flatnonzero(still).max(initial=0))
+    level = int(np.flatnonzero(still).max(initial=0))
+    return level if count[: level // 2].sum() < DARKER * count.sum() else 0
 
 
 def whole_white(image, valid=None) -> np.ndarray:

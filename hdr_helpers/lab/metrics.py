@@ -1,11 +1,12 @@
 """How far a result is from the truth. Light is counted in stops: log2, so that 1 is a factor of two."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from hdr_helpers.align import Motion
+from hdr_helpers.crf import CLIPPED, NOISE
 from hdr_helpers.load import in_8_bits
 
 
@@ -56,16 +57,59 @@ def psnr_mu(radiance, truth, mu: float = 5000.0) -> float:
 
     radiance, truth : (H, W, 3) float. One scale a channel is removed; the truth's 99th percentile is 1.
     """
-    truth = np.asarray(truth, dtype=np.float64)
-    radiance = np.nan_to_num(np.asarray(radiance, dtype=np.float64), nan=0, posinf=0)
-    usable = radiance > 0
-    scale = [np.median((truth / np.where(usable, radiance, 1))[..., c][usable[..., c]]) for c in range(3)]
+    radiance, truth = _same_scale(radiance, truth)
     white = np.percentile(truth, 99)
 
     def compress(light):
         return np.log1p(mu * np.tanh(light / white)) / np.log1p(mu)
 
-    return float(-10 * np.log10(np.mean((compress(radiance * scale) - compress(truth)) ** 2)))
+    return float(-10 * np.log10(np.mean((compress(radiance) - compress(truth)) ** 2)))
+
+
+def psnr_l(radiance, truth) -> float:
+    """PSNR in dB of the light itself, as in the NTIRE 2021 HDR challenge: the brightest pixels decide it.
+
+    radiance, truth : (H, W, 3) float. One scale a channel is removed; the truth's largest value is 1.
+    """
+    radiance, truth = _same_scale(radiance, truth)
+    return float(-10 * np.log10(np.mean(((radiance - truth) / truth.max()) ** 2)))
+
+
+def _same_scale(radiance, truth):
+    """Both as float64, the first with the median ratio of each channel removed; what is not finite counts as 0."""
+    truth = np.asarray(truth, dtype=np.float64)
+    radiance = np.nan_to_num(np.asarray(radiance, dtype=np.float64), nan=0, posinf=0)
+    usable = radiance > 0
+    scale = [np.median((truth / np.where(usable, radiance, 1))[..., c][usable[..., c]]) for c in range(3)]
+    return radiance * scale, truth
+
+
+def held_out(bracket, k: int, merge) -> tuple[np.ndarray, np.ndarray]:
+    """Predict one photograph of a bracket from the others: a check that needs no truth.
+
+    merge : from a Bracket to (radiance, crf); it gets the bracket without photograph k
+    Returns the prediction, (H, W, 3) float64 pixel values with fractions, 0..255; and by how much the photograph is
+    brighter, (H, W, 3) float64, NaN where it or the prediction is black, clipped or not valid.
+    """
+    others = [i for i in range(len(bracket)) if i != k]
+    valid = None if bracket.valid is None else tuple(bracket.valid[i] for i in others)
+    rest = replace(
+        bracket,
+        images=tuple(bracket.images[i] for i in others),
+        times=bracket.times[others],
+        names=tuple(bracket.names[i] for i in others),
+        places=(),
+        valid=valid,
+    )
+    radiance, crf = merge(rest)
+    log_exposure = np.log(radiance * bracket.times[k])
+    values = np.arange(crf.shape[1])
+    predicted = np.stack([np.interp(log_exposure[..., c], g, values) for c, g in enumerate(crf)], axis=-1)
+    seen = in_8_bits(bracket.images[k])
+    usable = (seen > NOISE) & (seen < CLIPPED) & (predicted > NOISE) & (predicted < CLIPPED)
+    if bracket.valid is not None:
+        usable &= bracket.valid[k][..., None]
+    return predicted, np.where(usable, seen - predicted, np.nan)
 
 
 def one_photo_errors(bracket) -> list[tuple[RadianceError, RadianceError]]:

@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib import patheffects
 
 from hdr_helpers._reading.evidence import transfer
-from hdr_helpers._response.clipping import CLIPPED
-from hdr_helpers._response.weights import NOISE
+from hdr_helpers.crf import CLIPPED, NOISE
 from hdr_helpers.lab.camera import Camera
 from hdr_helpers.lab.figures.style import (
     ACCENT,
