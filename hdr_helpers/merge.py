@@ -97,7 +97,7 @@ def merge_debevec(images, times, crf, w=None, valid=None, mean: str | None = Non
         raise ValueError(f"mean must be one of {', '.join(MEANS)}; got {mean!r}.")
     settle, weighting = False, "the given weights"
     if w is None:
-        w, settle = _weights_by_noise(images, times, crf, valid, mean)
+        w, settle = weights_by_noise(images, times, crf, valid, mean)
         weighting = "the noise that the photographs show" + (
             ", clipped pixels that are not quite white left out" * settle
         )
@@ -131,8 +131,13 @@ def _log1p(X, times):
 MEANS = {"log": _log, "linear": _linear, "log1p": _log1p}
 
 
-def _weights_by_noise(images, times, crf, valid, mean):
-    """1 / variance of what is averaged, (P, 3, 256), and whether clipped pixels hide behind other values than white."""
+def weights_by_noise(images, times, crf, valid=None, mean: str = "log1p") -> tuple[np.ndarray, bool]:
+    """What merge_debevec weighs photographs by where no weights are given.
+
+    Arguments as for merge_debevec, photographs in ascending order of their times.
+    Returns 1 / variance of what is averaged, (P, 3, 256) float64; and whether white is frayed: clipped pixels hide
+    behind other values than 255.
+    """
     few, masks = evidence(images, valid)
     joints = joint_histograms(few, masks, [(k, k + 1) for k in range(len(few) - 1)])
     frayed = frayed_white(joints, np.log(times), crf)

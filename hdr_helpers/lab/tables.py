@@ -1,7 +1,7 @@
 """Tables that notebooks print, so that their cells show what is computed and not how it is laid out."""
 
 from hdr_helpers.lab.figures import seconds
-from hdr_helpers.lab.metrics import crf_rmse
+from hdr_helpers.lab.metrics import crf_rmse, psnr_l, psnr_mu, radiance_error
 
 
 def print_crf_errors(curves: dict, truth) -> None:
@@ -10,6 +10,16 @@ def print_crf_errors(curves: dict, truth) -> None:
     print(" " * width + "    red  green   blue")
     for name, curve in curves.items():
         print(f"{name:{width}} " + " ".join(f"{error:6.3f}" for error in crf_rmse(curve, truth)))
+
+
+def print_merges(maps: dict, truth) -> None:
+    """How far radiance maps, name -> (H, W, 3), are from the truth: error in stops, PSNR-mu and PSNR-L in dB."""
+    width = max(map(len, maps))
+    print(" " * width + "   median error   95% better than   PSNR-mu   PSNR-L")
+    for name, radiance in maps.items():
+        error = radiance_error(radiance, truth)
+        stops = f"{error.median:9.3f} stops {error.p95:11.3f} stops"
+        print(f"{name:{width}} {stops} {psnr_mu(radiance, truth):6.1f} dB {psnr_l(radiance, truth):5.1f} dB")
 
 
 def print_motions(times, motions: dict, alignment) -> None:

@@ -4,7 +4,6 @@ python tests/benchmarks/crf.py [gsolve | recover | truth]
 """
 
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import cv2
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from measure import best_of
+from measure import best_of, in_turns
 from test_crf import paper_solution
 
 from hdr_helpers import Bracket, gsolve, hat_weights, recover_crf
@@ -69,17 +68,6 @@ def enlarged(bracket, shape) -> Bracket:
     times = [-(-n // m) for n, m in zip(shape, bracket.images[0].shape, strict=False)]
     images = [np.ascontiguousarray(np.tile(i, (*times, 1))[: shape[0], : shape[1]]) for i in bracket.images]
     return Bracket(tuple(images), bracket.times, bracket.names)
-
-
-def in_turns(runs: int, **works) -> dict:
-    """Least seconds of each work, all in this process: threads and caches are warm, as they are in a notebook."""
-    best = {}
-    for _ in range(runs + 1):  # the first round warms up
-        for name, work in works.items():
-            started = time.perf_counter()
-            work()
-            best.setdefault(name, []).append(time.perf_counter() - started)
-    return {name: min(seconds[1:]) for name, seconds in best.items()}
 
 
 def recoveries() -> None:

@@ -15,6 +15,25 @@ def best_of(runs: int, *works) -> dict:
     return best
 
 
+def in_turns(runs: int, **works) -> dict[str, float]:
+    """Least seconds of each work, all in this process: threads and caches are warm, as they are in a notebook."""
+    best = {name: [] for name in works}
+    for _ in range(runs + 1):  # the first round warms up
+        for name, work in works.items():
+            started = time.perf_counter()
+            work()
+            best[name].append(time.perf_counter() - started)
+    return {name: min(seconds[1:]) for name, seconds in best.items()}
+
+
+def needed(work) -> int:
+    """Bytes that a work needed beyond what was there, its result included."""
+    Path("/proc/self/clear_refs").write_text("5")  # the highest point so far is forgotten
+    before = _status("VmRSS")
+    work()
+    return _status("VmHWM") - before
+
+
 def _alone(work) -> tuple[float, int]:
     fork = multiprocessing.get_context("fork")
     queue = fork.Queue()

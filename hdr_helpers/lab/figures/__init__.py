@@ -36,9 +36,11 @@ from hdr_helpers.lab.figures.load import (
 from hdr_helpers.lab.figures.merge import (
     error_figure,
     false_colour_figure,
+    held_out_figure,
     honest_figure,
     pixel_estimates_figure,
     viewed_at,
+    weights_figure,
 )
 from hdr_helpers.lab.figures.style import jpeg_bytes, pictures_figure, png_bytes, seconds, show
 from hdr_helpers.lab.figures.tonemap import curve_figure, eight_bits_figure
@@ -59,6 +61,7 @@ __all__ = [
     "false_colour_figure",
     "ghost_map_figure",
     "hand_figure",
+    "held_out_figure",
     "histogram_figure",
     "honest_figure",
     "iso_figure",
@@ -80,4 +83,5 @@ __all__ = [
     "usable_share",
     "viewed_at",
     "vote_figure",
+    "weights_figure",
 ]

@@ -40,6 +40,46 @@ def pixel_estimates_figure(bracket, crf, w, points):
     return fig
 
 
+def weights_figure(curves, times, title):
+    """Weights of each pixel value, a panel for each of some photographs; the highest of all panels is 1.
+
+    curves : name -> (P, 256) weights; times : (P,) seconds of these photographs
+    """
+    fig, axes = new_figure(1, len(times), 3.2, sharey=True)
+    highest = {name: weights.max() for name, weights in curves.items()}
+    for k, (ax, t) in enumerate(zip(axes, times, strict=True)):
+        for (name, weights), (colour, style, _) in zip(curves.items(), THREE, strict=False):
+            ax.plot(weights[k] / highest[name], style, color=colour, label=name)
+        ax.set(xlabel="pixel value Z", yscale="log", ylim=(1e-6, 2))
+        ax.set_title(seconds(t), fontsize=10)
+        plain(ax)
+    axes[0].set_ylabel("weight")
+    axes[0].legend(frameon=False, loc="lower center")
+    headline(fig, title)
+    return fig
+
+
+def held_out_figure(photograph, predicted, missed, title):
+    """A photograph that was left out, its prediction from the others, and by how much they differ.
+
+    photograph : (H, W, 3) uint8; predicted : (H, W, 3), 0..255; missed : (H, W, 3) difference, NaN where unusable
+    """
+    fig, (left, middle, right) = new_figure(1, 3, 2.9)
+    for ax in (left, middle, right):
+        bare(ax)
+    left.imshow(photograph)
+    left.set_title("the photograph that was left out", fontsize=10)
+    middle.imshow(np.uint8(np.clip(predicted, 0, 255)))
+    middle.set_title("predicted from the others", fontsize=10)
+    colours = colormaps["PuOr_r"].with_extremes(bad="#888888")
+    shown = right.imshow(missed.mean(axis=2), cmap=colours, norm=TwoSlopeNorm(0, -12, 12), interpolation="none")
+    right.set_title("photograph minus prediction", fontsize=10)
+    bar = fig.colorbar(shown, ax=right, shrink=0.8, pad=0.02, extend="both")
+    bar.set_label("pixel values")
+    headline(fig, title)
+    return fig
+
+
 def viewed_at(radiance, stops: float, gamma: float = 2.2):
     """A radiance map as a photograph would show it: exposed, clipped, gamma. (H, W, 3) float 0..1.
 
