@@ -9,7 +9,7 @@ import pytest
 
 from hdr_helpers._merging import tables
 from hdr_helpers._merging.noise import exposure_variance, frayed_white
-from hdr_helpers.align import align_mtb, crop_common
+from hdr_helpers.align import align_mtb, crop_bracket, crop_common
 from hdr_helpers.crf import crf_opencv, fitted_weights, hat_weights, joint_histograms, recover_crf, whole_white
 from hdr_helpers.lab.bound import best_possible
 from hdr_helpers.lab.camera import Camera
@@ -266,6 +266,20 @@ def test_a_photograph_is_predicted_from_the_others(chapel):
     assert np.nanmedian(np.abs(missed)) < 2  # pixel values; noise and JPEG alone make more than 1
     wrong = replace(chapel, times=np.where(np.arange(9) == 4, 1.3 * chapel.times, chapel.times))
     assert abs(np.nanmedian(held_out(wrong, 4, merge)[1])) > 4 * abs(np.nanmedian(missed))
+
+
+@pytest.mark.parametrize("name", ["exposures", "frobisher", "memorial", "window"])
+def test_a_real_photograph_is_predicted_from_the_others(real, name):
+    bracket = load_bracket(real(name))
+    aligned = crop_bracket(bracket, align_mtb(bracket.images, valid=bracket.valid))
+
+    def merge(rest):
+        crf = recover_crf(rest).crf
+        return merge_debevec(rest.images, rest.times, crf, valid=rest.valid).radiance, crf
+
+    _, missed = held_out(aligned, len(aligned) // 2, merge)
+    assert np.isfinite(missed).mean() > 0.3
+    assert np.nanmedian(np.abs(missed)) < 6  # pixel values
 
 
 @pytest.mark.parametrize("times_type", [np.float32, np.float64, list])
