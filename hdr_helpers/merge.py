@@ -9,6 +9,7 @@ photographs say of their own noise, is in the rooms of _merging/.
 
 import os
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import cv2
@@ -195,6 +196,8 @@ def _checked(images, times, crf, w, valid):
         w = np.asarray(w, dtype=np.float64)
         if w.shape[-1:] != (LEVELS,) or not np.all(np.isfinite(w)) or w.min() < 0 or not w.max() > 0:
             raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+        if w.ndim > 3 or (*(1,) * (3 - w.ndim), *w.shape)[:2] not in product((1, len(images)), (1, 3)):
+            raise ValueError(f"w must be ({LEVELS},), (3, {LEVELS}) or (P, 3, {LEVELS}); got shape {w.shape}.")
         w = np.broadcast_to(w, (len(images), 3, LEVELS))[order]
     valid = None if valid is None else [np.asarray(valid[i], dtype=bool) for i in order]
     return [images[i] for i in order], times[order], crf, w, valid

@@ -376,6 +376,7 @@ def test_an_exr_file_reads_back_exactly(tmp_path):
         ({"crf": np.full((3, 256), np.nan)}, "finite"),
         ({"w": np.ones(255)}, "256 weights"),
         ({"w": -np.ones(256)}, "none negative"),
+        ({"w": np.ones((5, 3, 256))}, r"\(P, 3, 256\); got shape \(5, 3, 256\)"),
         ({"w": np.zeros(256)}, "not all 0"),
         ({"mean": "median"}, "mean must be one of log, linear, log1p; got 'median'"),
     ],
