@@ -10,7 +10,7 @@ from photographs import known
 
 from hdr_helpers.__main__ import main
 from hdr_helpers.align import align_mtb, crop_bracket, move_image, unaligned
-from hdr_helpers.crf import recover_crf, sample_pixels
+from hdr_helpers.crf import fitted_weights, recover_crf, sample_pixels
 from hdr_helpers.lab.brackets import CHAPEL_TIMES, handheld_chapel
 from hdr_helpers.lab.camera import Camera, sensitivity
 from hdr_helpers.lab.metrics import radiance_error
@@ -250,13 +250,12 @@ def test_what_stands_in_borders_does_not_reach_the_clipped_shares(bordered, kind
 
 
 def test_pixels_that_are_valid_in_all_photographs_merge_as_without_masks(bordered):
-    crf = bordered.truth.crf
-    masked = merge_debevec(bordered.images, bordered.times, crf, valid=bordered.valid).radiance
-    plain = merge_debevec(bordered.images, bordered.times, crf).radiance
-    # Beside a border a pixel has lost the neighbour that might have told that it is clipped.
-    inside = cv2.erode(np.logical_and.reduce(bordered.valid).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    crf, w = bordered.truth.crf, fitted_weights(bordered.images, bordered.valid)
+    masked = merge_debevec(bordered.images, bordered.times, crf, w, bordered.valid).radiance
+    plain = merge_debevec(bordered.images, bordered.times, crf, w).radiance
+    inside = np.logical_and.reduce(bordered.valid)
     assert 0.5 < inside.mean() < 0.95
-    assert np.array_equal(masked[inside], plain[inside])
+    np.testing.assert_allclose(masked[inside], plain[inside], rtol=1e-5)
 
 
 def test_masks_that_leave_nothing_out_change_nothing(small_bracket):
@@ -358,7 +357,7 @@ def in_16_bits(bracket):
 def test_16_bits_that_hold_8_merge_as_8_bits(small_bracket, curve):
     crf = small_bracket.truth.crf if curve == "true" else recover_crf(small_bracket).crf
     in_8, in_16 = (merge_debevec(b.images, b.times, crf).radiance for b in (small_bracket, in_16_bits(small_bracket)))
-    np.testing.assert_allclose(in_16, in_8, rtol=1e-6)
+    np.testing.assert_allclose(in_16, in_8, rtol=1e-5)
 
 
 def test_masks_work_on_16_bits_as_on_8(bordered):
@@ -366,7 +365,7 @@ def test_masks_work_on_16_bits_as_on_8(bordered):
     in_8, in_16 = (
         merge_debevec(b.images, b.times, crf, valid=b.valid).radiance for b in (bordered, in_16_bits(bordered))
     )
-    np.testing.assert_allclose(in_16, in_8, rtol=1e-6)
+    np.testing.assert_allclose(in_16, in_8, rtol=1e-5)
 
 
 @pytest.fixture(scope="session")
