@@ -4,15 +4,36 @@ One call for every operator: tonemap(radiance, "reinhard", gamma=2.2). A new ope
 takes a radiance map scaled by expose_for_screen and keyword parameters, and a line in OPERATORS.
 """
 
+import inspect
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from hdr_helpers.merge import write_whole
-from hdr_helpers.papers.durand2002 import LUMINANCE, tonemap_durand
+from hdr_helpers.papers.durand2002 import LEAST, LUMINANCE, in_colour, tonemap_durand, where_lit
+from hdr_helpers.papers.reinhard2002 import tonemap_reinhard_global
 
 DARKEST, BRIGHTEST = 0.1, 99.9  # percentiles of luminance between which a scene's range is measured
+POWER = 0.4185  # OpenCV's Mantiuk scales contrast ^ POWER
+CONTRAST = 30  # what Mantiuk leaves of a scene's range unless told otherwise; Durand's default, too
+GLARE = 0.05  # of white: a darkest grey up to this is taken off
+
+# The least and the greatest value of every parameter. A new parameter that is not here must only be finite.
+RANGES = {
+    "gamma": (0.1, 10),
+    "stops": (-30, 30),
+    "saturation": (0, 2),
+    "intensity": (-8, 8),
+    "light_adapt": (0, 1),
+    "color_adapt": (0, 1),
+    "bias": (0.5, 1),
+    "scale": (0.05, 1),
+    "contrast": (1, 1e6),
+    "detail": (0, 5),
+    "key": (0.01, 10),
+    "white": (0.01, np.inf),
+}
 
 
 def luminance(radiance) -> np.ndarray:
@@ -24,95 +45,150 @@ def dynamic_range_stops(radiance) -> float:
     """log2 of the ratio between the 99.9th and the 0.1th percentile of luminance.
 
     Percentiles, because a single noisy pixel would decide the ratio of maximum and minimum. Pixels without
-    light, which OpenCV's merge leaves where it knows nothing, do not count.
+    light, which OpenCV's merge leaves where it knows nothing, do not count, nor do those that are no number.
+    Raises ValueError where no pixel has light.
     """
     light = luminance(radiance)
-    low, high = np.percentile(light[light > 0], [DARKEST, BRIGHTEST])
+    light = light[np.isfinite(light) & (light > 0)]
+    if not light.size:
+        raise ValueError("This radiance map has no light in it: no value is finite and above 0.")
+    low, high = np.percentile(light, [DARKEST, BRIGHTEST])
     return float(np.log2(high / low))
 
 
 def tonemap(radiance, operator: str = "durand", **parameters) -> np.ndarray:
     """Tone-map a radiance map.
 
-    radiance : (H, W, 3) float, RGB, relative; left unharmed. NaN and negative values count as black,
+    radiance : (H, W, 3) numbers, RGB, relative; left unharmed. NaN and negative values count as black,
         infinite ones as the brightest finite value.
-    operator : a name in OPERATORS; parameters are that operator's own
+    operator : a name in OPERATORS; parameters are that operator's own, in the RANGES of this file
     Returns ldr, (H, W, 3) float32 in 0..1, RGB, gamma included. The same call gives the same picture.
-    Raises ValueError for an unknown operator, or one that can't work on a picture so small.
+    Raises ValueError for an unknown operator or parameter, a value out of range, or a map that is none.
     """
     if operator not in OPERATORS:
         raise ValueError(f"Unknown operator {operator!r}; there are {', '.join(sorted(OPERATORS))}.")
+    check_parameters(operator, parameters)
     scaled = expose_for_screen(radiance)
-    if scaled.min() == scaled.max():
-        return scaled  # nothing to compress; some of OpenCV's operators divide by the range
-    try:
-        ldr = OPERATORS[operator](scaled, **parameters)
-    except cv2.error as problem:
-        height, width = scaled.shape[:2]
-        raise ValueError(f"OpenCV's {operator} can't tone-map {width} x {height} pixels: {problem.err}") from None
-    return np.clip(np.nan_to_num(ldr), 0, 1).astype(np.float32)
+    if not scaled.any():
+        return scaled
+    ldr = OPERATORS[operator](scaled, **parameters)
+    return np.minimum(np.fmax(ldr, 0), 1).astype(np.float32, copy=False)  # fmax makes 0 of NaN
+
+
+def check_parameters(operator: str, parameters: dict) -> None:
+    """Raise ValueError for the first parameter that the operator does not have, or whose value is out of range."""
+    known = dict(list(inspect.signature(OPERATORS[operator]).parameters.items())[1:])
+    for name, value in parameters.items():
+        if name not in known:
+            raise ValueError(f"{operator} has no parameter {name!r}; it has {', '.join(known)}.")
+        if value is None and known[name].default is None:
+            continue
+        least, most = RANGES.get(name, (-np.finfo(float).max, np.finfo(float).max))
+        if not isinstance(value, (int, float, np.number)) or not least <= value <= most:  # NaN is not, either
+            raise ValueError(f"{name} of {operator} must be a number from {least:g} to {most:g}; got {value!r}.")
 
 
 def expose_for_screen(radiance) -> np.ndarray:
-    """A copy of a radiance map, finite, never negative, its 99.9th percentile of luminance at 1.
+    """A copy of a radiance map, finite, never negative, its 99.9th percentile of luminance at 1. (H, W, 3) float32.
 
     What is brighter is cut there. OpenCV's operators scale linearly to the maximum first, so that one
     absurdly bright pixel would darken all others.
+    Raises ValueError for what is no radiance map.
     """
-    safe = np.array(radiance, dtype=np.float32)
-    brightest = np.max(safe, where=np.isfinite(safe), initial=0)
+    radiance = np.asarray(radiance)
+    if radiance.ndim != 3 or radiance.shape[2] != 3 or not radiance.size or radiance.dtype.kind not in "fiu":
+        raise ValueError(
+            f"A radiance map must be (H, W, 3) numbers, at least one pixel; got {radiance.shape} {radiance.dtype}."
+        )
+    # Twice the precision only for what may not fit: 1e39 is too large for float32.
+    safe = radiance.astype(np.result_type(radiance.dtype, np.float32))
+    brightest = safe.max()
+    if not np.isfinite(brightest):
+        brightest = np.max(safe, where=np.isfinite(safe), initial=0)
+        np.nan_to_num(safe, copy=False, nan=0, posinf=max(brightest, 0), neginf=0)
     if brightest <= 0:
-        return np.zeros_like(safe)
-    np.nan_to_num(safe, copy=False, nan=0, posinf=brightest, neginf=0)
+        return np.zeros(safe.shape, np.float32)
     np.maximum(safe, 0, out=safe)
-    white = np.percentile(luminance(safe), BRIGHTEST)
-    return np.minimum(safe / (white if white > 0 else brightest), 1)
+    white = np.percentile(safe @ LUMINANCE, BRIGHTEST)
+    with np.errstate(over="ignore"):  # an absurd pixel may become infinite before it is cut
+        safe /= white if white > 0 else brightest
+    return np.minimum(safe, 1, out=safe).astype(np.float32, copy=False)
 
 
 def tonemap_gamma(radiance, gamma: float = 2.2, stops: float = 0.0) -> np.ndarray:
     """Gamma alone, the baseline: clip and encode.
 
-    gamma : 1 leaves the light linear, more brightens the mid-tones
-    stops : exposure compensation; +1 is twice as bright
+    gamma : 0.1..10; 1 leaves the light linear, more brightens the mid-tones
+    stops : -30..30; exposure compensation, +1 is twice as bright, and twice as bright a pixel is clipped
     """
     return np.clip(radiance * np.float32(2.0**stops), 0, 1) ** np.float32(1 / gamma)
 
 
-def tonemap_reinhard(radiance, gamma=2.2, intensity=0.0, light_adapt=0.0, color_adapt=0.0) -> np.ndarray:
-    """Reinhard and Devlin 2005, a model of how photoreceptors adapt, by OpenCV.
+def tonemap_reinhard(radiance, gamma=2.2, intensity=1.0, light_adapt=0.5, color_adapt=0.0) -> np.ndarray:
+    """Reinhard and Devlin 2005, a model of how photoreceptors adapt, by OpenCV. One curve for all pixels.
 
-    gamma : above 1 brightens
+    gamma : 0.1..10; above 1 brightens
     intensity : -8..8; more is brighter
     light_adapt : 0..1; 0 adapts to the whole picture, 1 to each pixel alone (flatter)
-    color_adapt : 0..1; 0 adapts all channels alike, 1 each on its own (removes a colour cast)
+    color_adapt : 0..1; 0 adapts all channels alike, 1 each on its own (removes a colour cast, and colours)
     """
     # A new object for every picture: OpenCV's changes its own state, the second call differs.
-    return cv2.createTonemapReinhard(gamma, intensity, light_adapt, color_adapt).process(radiance)
+    return through_opencv(cv2.createTonemapReinhard(gamma, intensity, light_adapt, color_adapt), radiance)
 
 
-def tonemap_drago(radiance, gamma=2.2, saturation=1.0, bias=0.85) -> np.ndarray:
+def tonemap_drago(radiance, gamma=2.2, saturation=0.8, bias=0.85) -> np.ndarray:
     """Drago, Myszkowski, Annen and Chiba 2003, a logarithm whose base follows the pixel, by OpenCV.
 
-    gamma : above 1 brightens
-    saturation : 0 is grey, 1 leaves colours alone
-    bias : 0.7..0.9 are usual; less lifts the dark parts
+    gamma : 0.1..10; above 1 brightens
+    saturation : 0..2; 0 is grey, 1 keeps colour ratios, which look too strong once luminance is compressed
+    bias : 0.5..1; less lifts the dark parts. 0.8 to 0.9 are usual; below, the very brightest darken again
+
+    OpenCV sees luminance alone: its own saturation is a power that turns bright colours white.
     """
-    return cv2.createTonemapDrago(gamma, saturation, bias).process(radiance)
+    light = np.maximum(luminance(radiance), LEAST)
+    shown = through_opencv(cv2.createTonemapDrago(1.0, 1.0, bias), cv2.merge([light] * 3))[..., 1]
+    return in_colour(radiance, light, shown, saturation, gamma)
 
 
-def tonemap_mantiuk(radiance, gamma=2.2, scale=0.7, saturation=1.0) -> np.ndarray:
+def tonemap_mantiuk(radiance, gamma=2.2, scale=None, saturation=0.8) -> np.ndarray:
     """Mantiuk, Myszkowski and Seidel 2006, contrasts compressed in a pyramid, by OpenCV.
 
-    gamma : above 1 brightens
-    scale : 0.6..0.9 are usual; factor on local contrast
-    saturation : 0 is grey, 1 leaves colours alone
+    gamma : 0.1..10; above 1 brightens
+    scale : 0.05..1; factor on local contrast as it is perceived: less is flatter, and lifts the dark parts.
+        None takes what leaves a contrast of 30 between the scene's darkest and brightest
+    saturation : 0..2; 0 is grey, 1 keeps colour ratios, which look too strong once luminance is compressed
+
+    As OpenCV scales the contrasts of all levels alike, the whole is a power of luminance: a global operator.
     """
-    return cv2.createTonemapMantiuk(gamma, scale, saturation).process(radiance)
+    light = np.maximum(luminance(radiance), LEAST)
+    if scale is None:
+        low, high = np.percentile(where_lit(light, light), [DARKEST, BRIGHTEST])
+        scale = (np.log(CONTRAST) / max(np.log(high / low), np.log(CONTRAST))) ** POWER
+    # OpenCV cuts at 1/10000 of the brightest. The square root brings a range twice as wide in there.
+    root = cv2.merge([np.sqrt(light)] * 3)
+    shown = through_opencv(cv2.createTonemapMantiuk(1.0, scale * 2**POWER, 1.0), root)[..., 1]
+    black = min(np.percentile(where_lit(shown, light), DARKEST), GLARE)
+    return in_colour(radiance, light, np.maximum(shown - black, 0) / (1 - black), saturation, gamma)
+
+
+def through_opencv(operator, radiance) -> np.ndarray:
+    """What an operator of OpenCV makes of a radiance map, kept from two of its traps.
+
+    It stretches the map to 0..1 first, which moves every value where the least is not 0. And a pixel that is
+    then black in all channels becomes NaN (0 / 0), which spoils the whole picture if it is the first one. So
+    no pixel is black, and one row and one column more, cut off again, hold a 0 in a single channel. They also
+    let Mantiuk's pyramid stand on a single pixel.
+    """
+    safe = cv2.copyMakeBorder(radiance, 0, 1, 0, 1, cv2.BORDER_REPLICATE)
+    np.maximum(safe, LEAST, out=safe)
+    safe[-1, np.argmin(luminance(safe[-1])), 2] = 0
+    return operator.process(safe)[:-1, :-1]
 
 
 OPERATORS = {
     "gamma": tonemap_gamma,
     "reinhard": tonemap_reinhard,
+    "reinhard_global": tonemap_reinhard_global,
     "drago": tonemap_drago,
     "mantiuk": tonemap_mantiuk,
     "durand": tonemap_durand,

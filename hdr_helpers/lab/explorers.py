@@ -3,6 +3,7 @@
 Every explorer draws into one Image widget, so nothing stacks up or flickers when a slider moves.
 """
 
+import inspect
 import time
 from functools import partial
 
@@ -152,7 +153,7 @@ def radiance_explorer(radiance):
 
 
 def tonemap_explorer(radiance):
-    """The operators and the parameters they have in common, on a small copy of the radiance map."""
+    """The operators and their parameters, on a small copy of the radiance map; what an operator lacks is greyed out."""
     height, width = radiance.shape[:2]
     size = (PREVIEW, round(PREVIEW * height / width))
     small = expose_for_screen(cv2.resize(radiance, size, interpolation=cv2.INTER_AREA))
@@ -162,26 +163,26 @@ def tonemap_explorer(radiance):
         description="operator",
         **CONTROL,
     )
-    gamma = widgets.FloatSlider(2.2, min=1, max=4, step=0.1, description="gamma", **CONTROL)
-    saturation = widgets.FloatSlider(1.0, min=0, max=1.5, step=0.05, description="saturation", **CONTROL)
-    contrast = widgets.FloatLogSlider(30, min=0.5, max=3, step=0.1, description="contrast", **CONTROL)
-    intensity = widgets.FloatSlider(0, min=-8, max=8, step=0.5, description="intensity", **CONTROL)
-    light = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="light_adapt", **CONTROL)
-    colour = widgets.FloatSlider(0, min=0, max=1, step=0.05, description="color_adapt", **CONTROL)
-
-    uses = {  # beside gamma, which all of them have
-        "gamma": {},
-        "reinhard": {"intensity": intensity, "light_adapt": light, "color_adapt": colour},
-        "drago": {"saturation": saturation},
-        "mantiuk": {"saturation": saturation},
-        "durand": {"saturation": saturation, "contrast": contrast},
+    controls = {
+        "gamma": widgets.FloatSlider(2.2, min=1, max=4, step=0.1),
+        "saturation": widgets.FloatSlider(0.8, min=0, max=1.5, step=0.05),
+        "contrast": widgets.FloatLogSlider(30, min=0.5, max=3, step=0.1),
+        "stops": widgets.FloatSlider(0, min=-4, max=10, step=0.5),
+        "intensity": widgets.FloatSlider(1, min=-8, max=8, step=0.5),
+        "light_adapt": widgets.FloatSlider(0.5, min=0, max=1, step=0.05),
+        "color_adapt": widgets.FloatSlider(0, min=0, max=1, step=0.05),
+        "key": widgets.FloatLogSlider(0.18, min=-2, max=0.5, step=0.1),
+        "bias": widgets.FloatSlider(0.85, min=0.5, max=1, step=0.01),
+        "scale": widgets.FloatSlider(0.6, min=0.3, max=1, step=0.02),
     }
+    for name, control in controls.items():
+        control.description = name
+        control.style.description_width, control.layout.width = "190px", "560px"
 
-    def draw(operator, gamma, **_):
-        for control in (saturation, contrast, intensity, light, colour):
-            control.disabled = control not in uses.get(operator, {}).values()
-        parameters = {name: control.value for name, control in uses.get(operator, {}).items()}
-        return jpeg_bytes(tonemap(small, operator, gamma=gamma, **parameters))
+    def draw(operator, **values):
+        has = inspect.signature(OPERATORS[operator]).parameters
+        for name, control in controls.items():
+            control.disabled = name not in has
+        return jpeg_bytes(tonemap(small, operator, **{name: value for name, value in values.items() if name in has}))
 
-    controls = {"operator": operator, "gamma": gamma, "saturation": saturation, "contrast": contrast}
-    return _explorer(draw, {**controls, "intensity": intensity, "light": light, "colour": colour})
+    return _explorer(draw, {"operator": operator, **controls})

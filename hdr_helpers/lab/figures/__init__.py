@@ -43,12 +43,20 @@ from hdr_helpers.lab.figures.merge import (
     weights_figure,
 )
 from hdr_helpers.lab.figures.style import jpeg_bytes, pictures_figure, png_bytes, seconds, show
-from hdr_helpers.lab.figures.tonemap import curve_figure, eight_bits_figure
+from hdr_helpers.lab.figures.tonemap import (
+    contact_sheet_figure,
+    curve_figure,
+    eight_bits_figure,
+    parameter_strip_figure,
+    pyramid_figure,
+    quality_maps_figure,
+)
 
 __all__ = [
     "bitmaps_figure",
     "clipping_overlay",
     "clipping_strip_figure",
+    "contact_sheet_figure",
     "crf_error_figure",
     "crf_figure",
     "curve_figure",
@@ -69,11 +77,14 @@ __all__ = [
     "jpeg_bytes",
     "matrix_figure",
     "one_photo_figure",
+    "parameter_strip_figure",
     "percentiles_figure",
     "pictures_figure",
     "pixel_estimates_figure",
     "pixel_figure",
     "png_bytes",
+    "pyramid_figure",
+    "quality_maps_figure",
     "sampling_figure",
     "seconds",
     "shifts_figure",
