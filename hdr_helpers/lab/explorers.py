@@ -153,7 +153,7 @@ def radiance_explorer(radiance):
 
 
 def tonemap_explorer(radiance):
-    """The operators and their parameters, on a small copy of the radiance map; what an operator lacks is greyed out."""
+    """The operators and their parameters, on a small copy of the radiance map; what an operator lacks is not shown."""
     height, width = radiance.shape[:2]
     size = (PREVIEW, round(PREVIEW * height / width))
     small = expose_for_screen(cv2.resize(radiance, size, interpolation=cv2.INTER_AREA))
@@ -182,7 +182,7 @@ def tonemap_explorer(radiance):
     def draw(operator, **values):
         has = inspect.signature(OPERATORS[operator]).parameters
         for name, control in controls.items():
-            control.disabled = name not in has
+            control.layout.display = None if name in has else "none"
         return jpeg_bytes(tonemap(small, operator, **{name: value for name, value in values.items() if name in has}))
 
     return _explorer(draw, {"operator": operator, **controls})
