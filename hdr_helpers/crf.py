@@ -227,7 +227,8 @@ def _by_least_squares(bracket, lam):
 def crf_opencv(bracket: Bracket, method: str = "debevec") -> np.ndarray:
     """What OpenCV recovers, in this course's form: (3, 256) float64, natural logarithms, crf[:, 128] = 0.
 
-    method : "debevec" (CalibrateDebevec) or "robertson" (CalibrateRobertson), with OpenCV's defaults
+    method : "debevec" (CalibrateDebevec) or "robertson" (CalibrateRobertson), with OpenCV's defaults. Robertson's
+        is NaN at values that no photograph holds, and gives white the mean exposure of all clipped pixels
     """
     create = {"debevec": cv2.createCalibrateDebevec, "robertson": cv2.createCalibrateRobertson}[method]
     # OpenCV wants float32 times: with float64 Robertson's answers another curve, and says nothing.
