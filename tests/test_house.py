@@ -3,9 +3,12 @@
 import ast
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+
+from hdr_helpers.lab.checks import most_points
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -99,6 +102,33 @@ def test_every_todo_has_signature_docstring_and_a_marked_solution(notebook):
         assert cell["source"].count("### BEGIN SOLUTION") == cell["source"].count("### END SOLUTION") == 1
         (function,) = ast.parse(cell["source"]).body
         assert ast.get_docstring(function)
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda n: n.stem)
+def test_every_todo_is_followed_by_its_check_worth_its_points(notebook):
+    cells = code_cells(notebook)
+    checks = 0
+    for todo, cell in pairwise(cells):
+        if not todo["metadata"].get("nbgrader", {}).get("solution"):
+            continue
+        number = todo["metadata"]["nbgrader"]["grade_id"].removeprefix("todo-").replace("-", ".")
+        (function,) = (node.name for node in ast.parse(todo["source"]).body)
+        assert f'result = check("{number}", {function})' in cell["source"]
+        assert cell["source"].endswith(f"{function} = result.function\nresult")
+        graded = cell["metadata"]["nbgrader"]
+        assert (graded["grade"], graded["locked"], graded["solution"]) == (True, True, False)
+        assert graded["points"] == most_points(number)
+        (output,) = cell["outputs"]
+        assert "".join(output["data"]["text/plain"]) == repr(most_points(number))
+        checks += 1
+    assert checks >= 2
+
+
+def test_the_readme_says_how_many_points_each_notebook_has():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for notebook in NOTEBOOKS:
+        points = sum(cell["metadata"].get("nbgrader", {}).get("points", 0) for cell in code_cells(notebook))
+        assert re.search(rf"notebooks/{notebook.stem}\.ipynb.*\| {points:g} \| \d+ \|$", text, re.M), notebook.stem
 
 
 def test_the_readmes_test_command_is_what_ci_runs():

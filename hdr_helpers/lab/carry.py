@@ -12,8 +12,14 @@ from hdr_helpers.merge import write_whole
 RESULTS = Path(os.environ.get("HDR_RESULTS", "results"))
 
 
-def keep(name: str, array) -> None:
-    """Save a result of yours for the next notebooks, as results/NAME.npy."""
+def keep(name: str, array, made_by=None) -> None:
+    """Save a result of yours for the next notebooks, as results/NAME.npy.
+
+    made_by : the function that made it; what the course's own made in the place of a TODO's is not kept
+    """
+    if hasattr(made_by, "in_place_of"):  # as checks mark the course's function
+        print(f"Not kept: the course's own {made_by.__name__} made this {name}.")
+        return
     RESULTS.mkdir(exist_ok=True)
     content = io.BytesIO()
     np.save(content, array)
