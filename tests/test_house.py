@@ -105,6 +105,18 @@ def test_every_todo_has_signature_docstring_and_a_marked_solution(notebook):
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda n: n.stem)
+def test_every_todo_says_what_comes_in_and_goes_out_in_how_many_lines_and_asks_for_a_prediction(notebook):
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    text = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    exercises = re.split(r"### TODO \d\.\d", text)[1:]
+    assert len(exercises) >= 2
+    for exercise in exercises:
+        exercise = re.split(r"^#", exercise, maxsplit=1, flags=re.M)[0]
+        for promised in (r"\*Out:\*", r"\*[^*]*\d lines?[^*]*\*", r"\*\*Predict:\*\*"):
+            assert re.search(promised, exercise), (promised, exercise[:60])
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda n: n.stem)
 def test_every_todo_is_followed_by_its_check_worth_its_points(notebook):
     cells = code_cells(notebook)
     checks = 0
