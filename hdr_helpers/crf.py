@@ -26,10 +26,11 @@ from hdr_helpers._response.weights import (
     gaussian_weights,
     hat_weights,
     noise_weights,
+    several_weights,
     uniform_weights,
 )
 from hdr_helpers.load import Bracket, in_8_bits
-from hdr_helpers.papers.grossberg_nayar2003 import TooLittleEvidence, response_from_transfers
+from hdr_helpers.papers.grossberg_nayar2003 import TooLittleEvidence, response_from_transfers, standard_errors
 
 __all__ = [
     "CLIPPED",
@@ -50,6 +51,7 @@ __all__ = [
     "noise_weights",
     "recover_crf",
     "sample_pixels",
+    "several_weights",
     "uniform_weights",
     "whole_white",
 ]
@@ -134,9 +136,7 @@ def _solve_reduced(Z, B, lam, w):
         missed += np.nansum(weight * (said - log_E[few, None]) ** 2)
         used += np.count_nonzero(weight) - np.count_nonzero(total)
     # The weights say how the variances of two rows compare; what the equations miss says how large they are.
-    covariance = scale[:, None] * scipy.linalg.cho_solve(factor, np.diag(scale)) * (missed / max(used, 1))
-    variances = covariance.diagonal() - 2 * covariance[MIDDLE] + covariance[MIDDLE, MIDDLE]
-    return g, log_E, np.sqrt(np.maximum(variances, 0))
+    return g, log_E, standard_errors(scale, factor, missed / max(used, 1))
 
 
 def _ties(Z, B, W) -> tuple[np.ndarray, np.ndarray]:

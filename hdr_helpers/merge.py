@@ -17,7 +17,16 @@ import numpy as np
 
 from hdr_helpers._merging.noise import exposure_variance, frayed_white
 from hdr_helpers._merging.tables import mean_by_tables
-from hdr_helpers.crf import CLIPPED, LEVELS, NOISE, black_level, evidence, fitted_weights, joint_histograms
+from hdr_helpers.crf import (
+    CLIPPED,
+    LEVELS,
+    NOISE,
+    black_level,
+    evidence,
+    fitted_weights,
+    joint_histograms,
+    several_weights,
+)
 from hdr_helpers.load import in_8_bits
 
 LAST_RESORT = 1e-3  # of the least weight: decides only where no photograph has any other weight
@@ -193,9 +202,7 @@ def _checked(images, times, crf, w, valid):
         raise ValueError(f"valid must hold one mask of {images[0].shape[:2]} for each photograph.")
     order = np.argsort(times)
     if w is not None:
-        w = np.asarray(w, dtype=np.float64)
-        if w.shape[-1:] != (LEVELS,) or not np.all(np.isfinite(w)) or w.min() < 0 or not w.max() > 0:
-            raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+        w = several_weights(w)
         if w.ndim > 3 or (*(1,) * (3 - w.ndim), *w.shape)[:2] not in product((1, len(images)), (1, 3)):
             raise ValueError(f"w must be ({LEVELS},), (3, {LEVELS}) or (P, 3, {LEVELS}); got shape {w.shape}.")
         w = np.broadcast_to(w, (len(images), 3, LEVELS))[order]

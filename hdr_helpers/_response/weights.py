@@ -70,8 +70,16 @@ def fitted_weights(images, valid=None, shape=hat_weights) -> np.ndarray:
 
 def checked_weights(w) -> np.ndarray:
     """w as (256,) float64. Raises ValueError unless it holds 256 weights, none negative and not all 0."""
+    w = several_weights(w)
+    if w.shape != (LEVELS,):
+        raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
+    return w
+
+
+def several_weights(w) -> np.ndarray:
+    """w as (..., 256) float64, for several channels or photographs. Raises ValueError as checked_weights does."""
     w = np.asarray(w, dtype=np.float64)
-    if w.shape != (LEVELS,) or not np.all(np.isfinite(w)) or w.min() < 0 or not w.max() > 0:
+    if w.shape[-1:] != (LEVELS,) or not np.all(np.isfinite(w)) or w.min() < 0 or not w.max() > 0:
         raise ValueError(f"w must hold {LEVELS} weights, none negative and not all 0; got shape {w.shape}.")
     return w
 

@@ -124,14 +124,19 @@ def response_from_transfers(
 
     misfit = (precision @ ratios**2 - g @ pull) / len(u)  # 1 if the precisions were right
     # The pairs share photographs: there are as many pieces of news as photographs beside the first.
-    covariance = (
-        scale[:, None]
-        * scipy.linalg.cho_solve(factor, np.diag(scale))
-        * misfit
-        * max(1, len(joints) / (photographs - 1))
-    )
-    variances = covariance.diagonal() - 2 * covariance[MIDDLE] + covariance[MIDDLE, MIDDLE]
-    return g - g[MIDDLE], np.sqrt(np.maximum(variances, 0))
+    repeated = max(1, len(joints) / (photographs - 1))
+    return g - g[MIDDLE], standard_errors(scale, factor, misfit * repeated)
+
+
+def standard_errors(scale, factor, variance: float) -> np.ndarray:
+    """Standard error of each difference g(z) - g(128), (256,) float64, from normal equations as they were solved.
+
+    scale, factor : (256,), and the Cholesky factor of the normal matrix scaled by it on both sides
+    variance : of an equation whose precision in the matrix is 1
+    """
+    covariance = scale[:, None] * scipy.linalg.cho_solve(factor, np.diag(scale)) * variance
+    of_differences = covariance.diagonal() - 2 * covariance[MIDDLE] + covariance[MIDDLE, MIDDLE]
+    return np.sqrt(np.maximum(of_differences, 0))
 
 
 def _mean_light(seen, g) -> np.ndarray:

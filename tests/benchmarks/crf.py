@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from measure import best_of, in_turns
+from measure import best_of, enlarged, in_turns
 from test_crf import paper_solution
 
-from hdr_helpers import Bracket, gsolve, hat_weights, recover_crf
+from hdr_helpers import gsolve, hat_weights, recover_crf
 from hdr_helpers.crf import crf_opencv
 from hdr_helpers.lab.camera import FAMILIES
 from hdr_helpers.lab.metrics import crf_rmse
@@ -61,13 +61,6 @@ def gsolves() -> None:
             print(line, flush=True)
     print("Growth: ours with the number of pixels and with the square of that of photographs;")
     print("a dense solution with the cube of the pixels, its matrix with their square.")
-
-
-def enlarged(bracket, shape) -> Bracket:
-    """The photographs repeated until they fill a shape."""
-    times = [-(-n // m) for n, m in zip(shape, bracket.images[0].shape, strict=False)]
-    images = [np.ascontiguousarray(np.tile(i, (*times, 1))[: shape[0], : shape[1]]) for i in bracket.images]
-    return Bracket(tuple(images), bracket.times, bracket.names)
 
 
 def recoveries() -> None:

@@ -4,6 +4,10 @@ import multiprocessing
 import time
 from pathlib import Path
 
+import numpy as np
+
+from hdr_helpers import Bracket
+
 
 def best_of(runs: int, *works) -> dict:
     """For each work, a function without arguments, its least seconds and the bytes it needed beyond what was there."""
@@ -54,3 +58,10 @@ def _measured(work, queue) -> None:
 def _status(key) -> int:
     (line,) = [text for text in Path("/proc/self/status").read_text().splitlines() if text.startswith(key)]
     return 1024 * int(line.split()[1])
+
+
+def enlarged(bracket, shape) -> Bracket:
+    """The photographs repeated until they fill a shape."""
+    times = [-(-n // m) for n, m in zip(shape, bracket.images[0].shape, strict=False)]
+    images = [np.ascontiguousarray(np.tile(i, (*times, 1))[: shape[0], : shape[1]]) for i in bracket.images]
+    return Bracket(tuple(images), bracket.times, bracket.names)

@@ -8,9 +8,9 @@ import sys
 
 import cv2
 import numpy as np
-from measure import in_turns, needed
+from measure import enlarged, in_turns, needed
 
-from hdr_helpers import Bracket, fitted_weights, hat_weights, merge_debevec, recover_crf
+from hdr_helpers import fitted_weights, hat_weights, merge_debevec, recover_crf
 from hdr_helpers.crf import crf_opencv
 from hdr_helpers.lab.bound import best_possible
 from hdr_helpers.lab.camera import Camera
@@ -28,11 +28,9 @@ NOISE = {"noise": {"jpeg_quality": None},
 def large(jpeg):
     """A bracket of 12 megapixels x 16, its curve, OpenCV's form of both."""
     camera = Camera(jpeg_quality=jpeg)
-    small = camera.shoot(random_scene(1), TIMES[16])
-    times = [-(-n // m) for n, m in zip(SHAPE, small.images[0].shape, strict=False)]
-    images = [np.ascontiguousarray(np.tile(i, (*times, 1))[: SHAPE[0], : SHAPE[1]]) for i in small.images]
+    bracket = enlarged(camera.shoot(random_scene(1), TIMES[16]), SHAPE)
     crf = camera.crf()
-    return Bracket(tuple(images), small.times, small.names), crf, np.exp(crf).T[:, None].astype(np.float32).copy()
+    return bracket, crf, np.exp(crf).T[:, None].astype(np.float32).copy()
 
 
 def works(jpeg):
