@@ -13,6 +13,7 @@ from hdr_helpers.lab.checks._report import Line, Result
 from hdr_helpers.lab.checks._running import NotStarted, Stop, Wrong, name_of, run_safely
 
 TODOS = {}
+NOT_LOOKED_AT = "Not looked at, because of what is said above."
 
 
 @dataclass
@@ -67,34 +68,47 @@ def _only_for_the_course(function, name):
     return course
 
 
-class Trial:
-    """One check of one function: runs it, remembers the largest difference, and what there is to note."""
+def call(todo: Todo, function, args, keywords, limit: float):
+    """What a student's function returns for copies of these arguments, with the answers to its TODO out of reach.
 
-    def __init__(self, todo: Todo, function, seed: int, limit: float):
-        self.todo, self.function, self.seed = todo, function, seed
+    limit : seconds
+    Raises as run_safely does, and Stop where the function calls an answer that already exists.
+    """
+    lent = {other.name: other.course for other in TODOS.values() if other.name in todo.uses}
+    with out_of_reach(function, todo.barred, lent) as reach:
+        try:
+            return run_safely(function, args, keywords, limit)
+        finally:
+            if reach.called:
+                names = " and ".join(dict.fromkeys(reach.called))
+                raise Stop(
+                    f"{name_of(function)} calls {names}, which is an answer that already exists; here it is "
+                    "out of reach, because you are to write your own."
+                )
+
+
+class Trial:
+    """One check of one function: runs it, remembers the largest difference, and what there is to note.
+
+    call : how the function is called; grading calls it in another process
+    """
+
+    def __init__(self, todo: Todo, function, seed: int, limit: float, call=call):
+        self.todo, self.function, self.seed, self.call = todo, function, seed, call
         self.left = limit  # seconds
         self.notes, self.worst, self.usable = [], None, True
-        lent = {other.name: other.course for other in TODOS.values() if other.name in todo.uses}
-        self._lent = lent
 
     def rng(self, *key: int) -> np.random.Generator:
         """Random numbers of this seed; other keys, other numbers."""
         return np.random.default_rng((self.seed, *key))
 
     def run(self, *args, **keywords):
-        """What the student's function returns for copies of these arguments. Raises as run_safely does."""
+        """What the student's function returns for copies of these arguments. Raises as call does."""
         began = time.monotonic()
-        with out_of_reach(self.function, self.todo.barred, self._lent) as reach:
-            try:
-                return run_safely(self.function, args, keywords, self.left)
-            finally:
-                self.left -= time.monotonic() - began
-                if reach.called:
-                    names = " and ".join(dict.fromkeys(reach.called))
-                    raise Stop(
-                        f"{name_of(self.function)} calls {names}, which is an answer that already exists; here it is "
-                        "out of reach, because you are to write your own."
-                    )
+        try:
+            return self.call(self.todo, self.function, args, keywords, self.left)
+        finally:
+            self.left -= time.monotonic() - began
 
     def compare(self, what: str, yours, spec) -> None:
         """Remember the place where yours differs most from what is expected."""
@@ -113,15 +127,13 @@ class Trial:
             self.notes.append(sentence)
 
 
-def examine(todo: Todo, function, seed: int, limit: float) -> Result:
+def examine(todo: Todo, function, seed: int, limit: float, call=call) -> Result:
     """Check a function against every part of a TODO."""
-    own = getattr(function, "in_place_of", function)  # a cell may be run twice
-    if not callable(own):
-        own = _not_callable(own)
-    trial, lines, ended = Trial(todo, own, seed, limit), [], None
+    own = own_of(function)
+    trial, lines, ended = Trial(todo, own, seed, limit, call), [], None
     for k, (points, says, part) in enumerate(todo.parts):
         if ended:
-            lines.append(Line("wrong", "Not looked at, because of what is said above.", points))
+            lines.append(Line("wrong", NOT_LOOKED_AT, points))
             continue
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):  # anything on stderr would cost all points
@@ -153,6 +165,12 @@ def examine(todo: Todo, function, seed: int, limit: float) -> Result:
             f'Until it is mended, the course\'s own {todo.name} goes on in its place; hint("{todo.number}") helps.'
         )
     return result
+
+
+def own_of(function):
+    """The student's function, where the course's may stand in its place: a cell may be run twice."""
+    own = getattr(function, "in_place_of", function)
+    return own if callable(own) else _not_callable(own)
 
 
 def stand_in(todo: Todo, own):
