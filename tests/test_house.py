@@ -136,11 +136,14 @@ def test_every_todo_is_followed_by_its_check_worth_its_points(notebook):
     assert checks >= 2
 
 
-def test_the_readme_says_how_many_points_each_notebook_has():
+def test_the_readme_says_how_many_points_each_notebook_has_by_checks_and_for_answers_in_words():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for notebook in NOTEBOOKS:
-        points = sum(cell["metadata"].get("nbgrader", {}).get("points", 0) for cell in code_cells(notebook))
-        assert re.search(rf"notebooks/{notebook.stem}\.ipynb.*\| {points:g} \| \d+ \|$", text, re.M), notebook.stem
+        points = {"code": 0, "markdown": 0}
+        for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+            points[cell["cell_type"]] += cell["metadata"].get("nbgrader", {}).get("points", 0)
+        both = rf"{points['code']:g} \+ {points['markdown']:g}"
+        assert re.search(rf"notebooks/{notebook.stem}\.ipynb.*\| {both} \| \d+ \|$", text, re.M), notebook.stem
 
 
 def test_the_readmes_test_command_is_what_ci_runs():

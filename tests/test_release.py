@@ -7,6 +7,7 @@ import sys
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import filling
 import nbformat
@@ -18,7 +19,7 @@ from hdr_helpers.grading import release as releasing
 from hdr_helpers.grading.__main__ import main
 from hdr_helpers.grading.course import InstructorError
 from hdr_helpers.grading.release import pack, release
-from hdr_helpers.grading.solutions import all_strings, is_todo, read_notebook, todos, without_solutions
+from hdr_helpers.grading.solutions import all_strings, is_todo, read_notebook, todos, without_solutions, written
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -102,18 +103,10 @@ def test_a_folder_that_is_handed_out_is_no_place_for_the_edition(capsys):
 
 
 def test_nbgrader_finds_the_course_by_its_configuration():
-    class Anything:
-        def __getattr__(self, name):
-            setattr(self, name, Anything())
-            return getattr(self, name)
-
-    config = Anything()
-    exec((ROOT / "nbgrader_config.py").read_text(encoding="utf-8"), {"get_config": lambda: config})
-    directory = config.CourseDirectory
-    assert Path(directory.root) == ROOT
-    for step in course.STEPS:
-        assert getattr(directory, f"{step}_directory") == f"build/{step}"
-    assert directory.db_url.startswith("sqlite:///") and directory.db_url.endswith("/build/gradebook.db")
+    config = SimpleNamespace(CourseDirectory=SimpleNamespace())
+    path = ROOT / "nbgrader_config.py"
+    exec(path.read_text(encoding="utf-8"), {"get_config": lambda: config, "__file__": str(path)})
+    assert Path(config.CourseDirectory.root) == ROOT / course.BUILD
     assert "build/" in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
 
 
@@ -172,8 +165,9 @@ def test_no_file_of_the_edition_has_a_line_of_a_solution_that_the_source_keeps_t
     sources = [read_notebook(path) for path in NOTEBOOKS]
     handed_out = "\n".join(path.read_text(encoding="utf-8") for path in PARTS)  # searched by a test of its own
     public = set(map(str.strip, "\n".join([*map(without_solutions, sources), handed_out]).splitlines()))
-    secret = {line.strip() for source in sources for todo in todos(source) for line in todo.solution} - public - {""}
-    assert len(secret) > 50
+    exercises = [exercise for source in sources for exercise in (*todos(source), *written(source))]
+    secret = {line.strip() for exercise in exercises for line in exercise.solution} - public - {""}
+    assert len(secret) > 100
     packed = zipfile.ZipFile(edition[1])
     for name in packed.namelist():
         content = packed.read(name)
@@ -227,6 +221,6 @@ def test_the_edition_has_what_the_start_command_needs(edition):
 @pytest.mark.parametrize("source", NOTEBOOKS, ids=lambda path: path.stem)
 def test_with_the_solutions_filled_in_every_cell_is_the_sources_again(edition, source):
     filled = filling.filled_in(read_notebook(edition[0] / "notebooks" / source.name), read_notebook(source))
-    unmarked = re.compile(r"^\s*### (BEGIN|END) SOLUTION\n?", re.M)
+    unmarked = re.compile(r"^\s*(<!-- )?### (BEGIN|END) SOLUTION( -->)?(\n|$)", re.M)
     wanted = {cell["id"]: unmarked.sub("", cell["source"]).rstrip() for cell in read_notebook(source)["cells"]}
     assert {c["id"]: c["source"].rstrip() for c in filled["cells"] if not c["id"].endswith("-expected")} == wanted

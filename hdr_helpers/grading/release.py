@@ -13,15 +13,18 @@ from hdr_helpers.grading.solutions import (
     all_strings,
     given_away,
     is_todo,
+    is_written,
     notebook_bytes,
     read_notebook,
     todos,
     without_solutions,
+    written,
 )
 
 TOP = "hdr_course"  # the one folder in the zip, whatever the folder beside it is called
 README = Path(__file__).with_name("STUDENT.md")
 STUB = "raise NotImplementedError()"
+WRITTEN_STUB = "YOUR ANSWER HERE"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first moment that a zip can hold
 TABLES = ("build-system", "project", "tool.setuptools.packages.find")  # of pyproject.toml; the others are for CI
 NOT_HANDED_OUT = {"__pycache__", "grading", ".ipynb_checkpoints"}
@@ -44,7 +47,7 @@ def release(out, overwrite=False, root=ROOT) -> tuple[Path, Path]:
     # On Windows the gradebook may still be open for a moment.
     with tempfile.TemporaryDirectory(dir=out.parent, prefix=".release_", ignore_cleanup_errors=True) as aside:
         aside = Path(aside)
-        generate(notebooks, aside)
+        generate(notebooks, aside / BUILD)
         folder, packed = aside / TOP, aside / f"{TOP}.zip"
         assemble(folder, [aside / BUILD / "release" / path.stem / path.name for path in notebooks], root)
         leaks = leaks_of(folder, notebooks)
@@ -83,12 +86,12 @@ def assemble(folder: Path, notebooks: list[Path], root: Path) -> None:
     """Make the folder that a student gets.
 
     folder : must not be there; notebooks : as nbgrader made them; root : the course
-    Raises InstructorError where a notebook has a TODO without its stub or a stored output.
+    Raises InstructorError where a notebook has a TODO or a written answer without its stub, or a stored output.
     """
     (folder / "notebooks").mkdir(parents=True)
     for path in notebooks:
         (folder / "notebooks" / path.name).write_bytes(notebook_bytes(_checked(read_notebook(path), path.name)))
-    for part in ("hdr_helpers", "data"):
+    for part in ("hdr_helpers", "data", ".binder"):
         for source in files(root / part):
             target = folder / source.relative_to(root)
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -101,7 +104,8 @@ def assemble(folder: Path, notebooks: list[Path], root: Path) -> None:
 
 def _checked(notebook: dict, name: str) -> dict:
     for cell in notebook["cells"]:
-        if is_todo(cell) and STUB not in cell["source"]:
+        stub = STUB if is_todo(cell) else WRITTEN_STUB if is_written(cell) else ""
+        if stub not in cell["source"]:
             raise InstructorError(f"{cell['metadata']['nbgrader']['grade_id']} in {name} has no stub.")
         if cell.get("outputs") or cell.get("execution_count"):
             raise InstructorError(f"{name} still has the output of a cell: {cell['source'][:60]!r}")
@@ -137,7 +141,7 @@ def student_pyproject(text: str) -> str:
 def leaks_of(folder: Path, notebooks: list[Path]) -> list[str]:
     """What a student edition gives away, a sentence each with its file. notebooks : the source edition's."""
     sources = [read_notebook(path) for path in notebooks]
-    exercises = [todo for source in sources for todo in todos(source)]
+    exercises = [exercise for source in sources for exercise in (*todos(source), *written(source))]
     public = "\n".join(map(without_solutions, sources))
     leaks = []
     for path in sorted(folder.rglob("*")):
