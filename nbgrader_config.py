@@ -3,6 +3,7 @@
 First `python -m hdr_helpers.grading stage`, which lays the notebooks out in build/, then `nbgrader` as you like.
 """
 
-from hdr_helpers.grading.course import configure
+from pathlib import Path
 
-configure(get_config())  # noqa: F821  nbgrader provides it
+c = get_config()  # noqa: F821  nbgrader provides it
+c.CourseDirectory.root = str(Path(__file__).parent / "build")
