@@ -91,7 +91,7 @@ def test_a_picture_of_the_next_section_or_by_another_function_is_not_the_expecte
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_staged_notebook_is_an_assignment_of_its_own_and_valid(notebook, tmp_path):
     assert stage([notebook], tmp_path) == [notebook.stem]
-    staged = tmp_path / "build" / "source" / notebook.stem / notebook.name
+    staged = tmp_path / "source" / notebook.stem / notebook.name
     nbformat.validate(nbformat.read(staged, as_version=4))
 
 

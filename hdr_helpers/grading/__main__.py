@@ -1,10 +1,10 @@
-"""The instructor's commands: python -m hdr_helpers.grading release [-o DIR]"""
+"""The instructor's commands: python -m hdr_helpers.grading release | grade SUBMISSIONS | stage"""
 
 import argparse
 import sys
 from pathlib import Path
 
-from hdr_helpers.grading.course import BUILD, ROOT, InstructorError, source_notebooks, stage
+from hdr_helpers.grading.course import BUILD, ROOT, InstructorError, nbgrader_api, source_notebooks, stage
 from hdr_helpers.grading.release import TOP, release
 
 
@@ -31,6 +31,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     _add_release(commands)
+    _add_grade(commands)
     _add_stage(commands)
     return parser
 
@@ -61,6 +62,45 @@ def _release(options) -> None:
     folder, archive = release(options.out, options.overwrite)
     print(f"The student edition is {folder}")
     print(f"and, to hand out, {archive} ({archive.stat().st_size / 1e6:.1f} MB).")
+
+
+def _add_grade(commands) -> None:
+    command = commands.add_parser(
+        "grade",
+        help="grade submissions: a table, a report, feedback and a gradebook",
+        description="Grade what a learning platform gives: a folder or a zip of submissions. Student code runs in a "
+        "sandbox, without network, bounded in time, memory, processes and output; checks use other data than in the "
+        "notebooks. Written to OUT: grades.csv, report.html, feedback/ with a page for each student, and nbgrader's "
+        "gradebook, in which answers in words are marked. Run again, it grades what is new and keeps what was marked.",
+        epilog="Exit code: 0 done, 1 it can't be done, 2 wrong usage.",
+    )
+    command.add_argument("submissions", type=Path, metavar="SUBMISSIONS", help="a folder or a zip")
+    out = ROOT / BUILD / "grading"
+    command.add_argument(
+        "-o", "--out", type=Path, default=out, metavar="OUT", help=f"folder of the results (default: {BUILD}/grading)"
+    )
+    command.add_argument("--workers", type=int, default=2, metavar="N", help="students at one time (default: 2)")
+    command.add_argument("--scheduler", metavar="ADDRESS", help="grade on the workers of this Dask scheduler")
+    command.add_argument("--seed", type=int, default=1997, metavar="N", help="of the checks' data (default: 1997)")
+    command.add_argument("--memory", type=int, metavar="MB", help="that a notebook may use (default: 4096)")
+    command.add_argument("--minutes", type=float, metavar="M", help="that a notebook may take (default: 15)")
+    command.add_argument("--no-sandbox", action="store_true", help="run student code as you, with all your rights")
+    command.add_argument("--again", action="store_true", help="grade also what has been graded before")
+    command.set_defaults(run=_grade)
+
+
+def _grade(options) -> None:
+    nbgrader_api(options.out)  # says it in a sentence where nbgrader is missing
+    from hdr_helpers.grading._running.sandbox import Bounds
+    from hdr_helpers.grading.grade import Options, grade
+
+    if options.workers < 1:
+        raise InstructorError(f"--workers {options.workers}: at least 1 is needed.")
+    asked = {"memory": options.memory, "notebook": options.minutes and 60 * options.minutes}
+    bounds = Bounds(**{name: value for name, value in asked.items() if value is not None})
+    sandboxed = not options.no_sandbox
+    how = Options(options.workers, options.scheduler, options.seed, bounds, sandboxed, options.again)
+    grade(options.submissions, options.out, how)
 
 
 def _add_stage(commands) -> None:

@@ -13,24 +13,11 @@ from hdr_helpers.merge import write_whole
 
 ROOT = Path(__file__).parents[2]
 BUILD = "build"
-STEPS = ("source", "source_with_tests", "release", "submitted", "autograded", "feedback", "solution")
 IMAGES = {"image/jpeg": "expected.jpg", "image/png": "expected.png"}
 
 
 class InstructorError(Exception):
     """What keeps an instructor's command from being done, in a sentence."""
-
-
-def configure(config, root=ROOT) -> None:
-    """Tell nbgrader's configuration where the course is and that each step has its folder in build/.
-
-    config : a traitlets Config, as get_config() gives it in nbgrader_config.py
-    """
-    directory = config.CourseDirectory
-    directory.root = str(root)
-    for step in STEPS:
-        setattr(directory, f"{step}_directory", f"{BUILD}/{step}")
-    directory.db_url = f"sqlite:///{(Path(root) / BUILD / 'gradebook.db').as_posix()}"
 
 
 def source_notebooks(root=ROOT) -> list[Path]:
@@ -41,13 +28,13 @@ def source_notebooks(root=ROOT) -> list[Path]:
     return notebooks
 
 
-def stage(notebooks, root=ROOT) -> list[str]:
-    """Write each notebook to build/source/NAME/NAME.ipynb under root, where nbgrader looks for assignments.
+def stage(notebooks, place=ROOT / BUILD) -> list[str]:
+    """Write each notebook to source/NAME/NAME.ipynb in place, where nbgrader looks for assignments.
 
     Returns the names of the assignments. Raises ValueError where a file is not a notebook or a TODO is not marked.
     """
     for path in notebooks:
-        folder = Path(root) / BUILD / "source" / path.stem
+        folder = Path(place) / "source" / path.stem
         folder.mkdir(parents=True, exist_ok=True)
         write_whole(folder / path.name, notebook_bytes(with_expected_pictures(read_notebook(path))))
     return [path.stem for path in notebooks]
@@ -96,8 +83,8 @@ def _picture_cell(grade_id: str, kind: str, content: str, alt: str) -> dict:
     }
 
 
-def nbgrader_api(root=ROOT):
-    """nbgrader's programming interface for the course that is staged under root.
+def nbgrader_api(place=ROOT / BUILD):
+    """nbgrader's programming interface for the course that is staged in place.
 
     Raises InstructorError where nbgrader is not installed.
     """
@@ -113,20 +100,20 @@ def nbgrader_api(root=ROOT):
     scripts = str(Path(sys.executable).parent)
     if scripts not in os.environ.get("PATH", "").split(os.pathsep):
         os.environ["PATH"] = os.pathsep.join([scripts, os.environ.get("PATH", "")])
-    (Path(root) / BUILD).mkdir(parents=True, exist_ok=True)
+    Path(place).mkdir(parents=True, exist_ok=True)
     config = Config()
-    configure(config, root)
+    config.CourseDirectory.root = str(place)  # each step has its folder in there, and the gradebook is gradebook.db
     return NbGraderAPI(config=config)
 
 
-def generate(notebooks, root=ROOT):
-    """Stage notebooks under root and make their student versions, build/release/NAME/NAME.ipynb, by nbgrader.
+def generate(notebooks, place=ROOT / BUILD):
+    """Stage notebooks in place and make their student versions, release/NAME/NAME.ipynb, by nbgrader.
 
-    The gradebook, build/gradebook.db, then knows the points and the hidden tests of every check.
+    The gradebook, gradebook.db, then knows the points and the hidden tests of every check.
     Returns nbgrader's interface. Raises InstructorError where nbgrader is missing or refuses a notebook.
     """
-    api = nbgrader_api(root)
-    for name in stage(notebooks, root):
+    api = nbgrader_api(place)
+    for name in stage(notebooks, place):
         result = api.generate_assignment(name)
         if not result["success"]:
             said = [line for line in (result.get("log") or result.get("error") or "").splitlines() if line.strip()]

@@ -1,0 +1,1 @@
+"""Rooms behind grade: what was handed in, brought in and put right."""

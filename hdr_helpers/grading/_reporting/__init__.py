@@ -1,0 +1,1 @@
+"""Rooms behind grade: what an instructor and a student read afterwards."""

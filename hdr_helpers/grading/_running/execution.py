@@ -1,0 +1,173 @@
+"""Running a submitted notebook: nbgrader's Execute with a watched kernel, bounds, and an examiner for the checks.
+
+Where a cell ends its kernel, the notebook is run once more without that cell, so that one bad cell costs no other.
+"""
+
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbformat.v4 import new_code_cell, new_output
+from nbgrader.preprocessors import Execute
+
+from hdr_helpers.grading._running.examiner import Examiner, unasked
+from hdr_helpers.grading._running.harmless import harmless
+from hdr_helpers.grading._running.kernel import Watch, kernel_manager
+from hdr_helpers.grading._running.sandbox import MB, SCRATCH, Bounds
+
+RUNS = 4  # of one notebook
+PRELUDE = "from hdr_helpers.lab.checks import check, hint"
+ENDINGS = {
+    "dead": "it ended the kernel",
+    "memory": "it took more than {memory} MB of memory",
+    "processes": "it started more than {processes} processes",
+    "disk": "it wrote more than {disk} MB",
+    "time": "it went on for more than {cell:g} seconds and could not be interrupted",
+    "examiner": "it could not be interrupted",
+}
+
+
+@dataclass
+class Task:
+    """One notebook to run, and what came of it.
+
+    folder : for this notebook alone; seed : of the examiner's data
+    results : of the checks, by number; asked : the numbers of those that were run
+    flags : sentences for the instructor; stopped : whether the notebook did not get to its end
+    """
+
+    folder: Path
+    bounds: Bounds
+    seed: int
+    sandboxed: bool
+    results: dict = field(default_factory=dict)
+    asked: set = field(default_factory=set)
+    flags: list = field(default_factory=list)
+    stopped: bool = False
+
+
+def number_of(cell, kind: str = "check") -> str:
+    """ "3.1" for the check cell of TODO 3.1 (or kind "todo", its own cell), empty for any other cell."""
+    name = str(cell.metadata.get("nbgrader", {}).get("grade_id", ""))
+    return name.removeprefix(f"{kind}-").replace("-", ".") if name.startswith(f"{kind}-") else ""
+
+
+class ExecuteSubmission(Execute):
+    """nbgrader's Execute for the notebook in task, which is set before nbgrader makes an instance."""
+
+    task: Task = None
+
+    def preprocess(self, nb, resources=None, km=None):
+        """Run all cells, then put what the examiner found into the check cells."""
+        task = self.task
+        self.timeout, self.store_widget_state = int(task.bounds.cell), False
+        self.skipped, self.watch, self.deadline = {}, None, time.monotonic() + task.bounds.notebook
+        (task.folder / SCRATCH).mkdir(parents=True, exist_ok=True)
+        self.examiner = Examiner(
+            str(task.folder / SCRATCH / "examiner") if os.name == "posix" else None,
+            task.seed,
+            task.bounds.check,
+            task.folder / SCRATCH,
+            stop=lambda: self.watch.kill("examiner"),
+        )
+        try:
+            if not any(self._runs_to_its_end(nb, resources) for _ in range(RUNS)):
+                task.stopped = True
+        finally:
+            self.examiner.close()
+        task.results = self.examiner.results
+        task.asked = set(task.results)
+        for cell in nb.cells:
+            harmless(cell)
+            if number := number_of(cell):
+                self._show(cell, number, nb)
+        return nb, self.resources
+
+    def _runs_to_its_end(self, nb, resources) -> bool:
+        """Run the notebook; where that fails, see to it that the next run does not fail there."""
+        self.at, self.began = 0, False
+        try:
+            super().preprocess(nb, resources)
+            return True
+        except (DeadKernelError, CellTimeoutError, RuntimeError) as problem:
+            if not self.began:
+                raise  # no kernel at all: this is not the student's doing
+            self.examiner.settle()
+            why = self.watch.why or ("time" if isinstance(problem, CellTimeoutError) else "dead")
+        finally:
+            if self.watch:
+                self.watch.kill("over")
+                self.watch.stop()
+        number, said = number_of(nb.cells[self.at]), ENDINGS[why].format(**vars(self.task.bounds))
+        if number in self.examiner.results:  # it remembers, and does not ask for this function again
+            self.task.flags.append(f"TODO {number}, when its check ran it: {said}. The notebook was run once more.")
+        else:
+            self.skipped[self.at] = f"Cell {self.at + 1} was left out, because {said}."
+            self.task.flags.append(self.skipped[self.at])
+        return False
+
+    def create_kernel_manager(self):
+        task = self.task
+        self.km, self.place = kernel_manager(task.folder, self.examiner.address, task.bounds, task.sandboxed)
+        return self.km
+
+    def start_new_kernel(self, **keywords):
+        super().start_new_kernel(**keywords | {"cwd": str(self.place)})
+        self.watch = Watch(self.km.provisioner.process.pid, self.task.folder, self.task.bounds)
+
+    def preprocess_cell(self, cell, resources, index):
+        self.at, self.began, self.shown = index, True, 0
+        if index in self.skipped:
+            said = self.skipped[index]
+            cell["outputs"] = [new_output("error", ename="LeftOut", evalue=said, traceback=[said])]
+            return cell, resources
+        if time.monotonic() > self.deadline:
+            if not self.task.stopped:
+                self.task.stopped = True
+                said = (
+                    f"It took more than {self.task.bounds.notebook:g} seconds; cell {index + 1} and later were not run."
+                )
+                self.task.flags.append(said)
+            cell["outputs"] = []
+            return cell, resources
+        number = number_of(cell)
+        self.examiner.expect(number)
+        if number:  # a student may have used the name for something else
+            self.execute_cell(new_code_cell(PRELUDE), index, store_history=False)
+        cell, resources = super().preprocess_cell(cell, resources, index)
+        if any(output.get("ename") == "CellTimeoutError" for output in cell.get("outputs", ())):
+            self.task.flags.append(f"Cell {index + 1} was interrupted after {self.task.bounds.cell:g} seconds.")
+        return cell, resources
+
+    def output(self, outs, msg, display_id, cell_index):
+        """Keep what a cell shows, as far as it may."""
+        content = msg["content"]
+        self.shown += sum(len(str(part)) for part in (*content.get("data", {}).values(), content.get("text", "")))
+        if self.shown <= self.task.bounds.output * MB:
+            return super().output(outs, msg, display_id, cell_index)
+        said = f"Cell {cell_index + 1} showed more than {self.task.bounds.output:g} MB; the rest was dropped."
+        if said not in self.task.flags:
+            self.task.flags.append(said)
+        return None
+
+    def _show(self, cell, number, nb):
+        """The check cell shows the examiner's result, whatever the kernel printed there."""
+        if number not in self.task.results:
+            self.task.results[number] = unasked(number, self._why_unasked(cell, number, nb))
+        result = self.task.results[number]
+        data = {"text/plain": repr(result), "text/html": result._repr_html_()}
+        cell.outputs = [new_output("execute_result", data=data, execution_count=cell.get("execution_count"))]
+
+    def _why_unasked(self, cell, number, nb) -> str:
+        own = [other for other in nb.cells if number_of(other, "todo") == number]
+        if not own:
+            return f"The cell of TODO {number} is not in this notebook."
+        for place, where in (("its own cell", own[0]), ("its check cell", cell)):
+            for error in (output for output in where.get("outputs", ()) if output.output_type == "error"):
+                said = " ".join(f"{error.ename}: {error.evalue}".split())[:160]
+                return f"The check could not be run, because {place} ended with {said}."
+        if self.task.stopped:
+            return "The check was not reached, because the notebook was stopped before."
+        return "The check was not asked for: in this notebook the name check no longer stands for the course's."
