@@ -85,8 +85,13 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
     Each photograph is compared with its neighbour in exposure, which looks most like it, or with the next but one;
     the motions are added up along the chain. Where the hand did not turn, photographs are moved by whole pixels and
     keep their values; where it did, they are interpolated.
+    Returns an Alignment.
     Raises ValueError for fewer than two photographs, photographs of different or unknown form, masks that do not fit
     them, or a max_shift below 1.
+
+    >>> scene = cv2.resize(np.random.default_rng(0).integers(0, 200, (12, 18, 3), np.uint8), (180, 120))
+    >>> align_mtb([scene[2:, 5:] // 2, scene[:-2, :-5]]).shifts.tolist()  # the first has lost 5 columns and 2 rows
+    [[5.0, 2.0], [0.0, 0.0]]
     """
     images = tuple(images)
     if len(images) < 2:
@@ -108,7 +113,7 @@ def align_mtb(images, max_shift: int | None = None, valid=None) -> Alignment:
     reference = len(images) // 2
     sides = range(reference + 1, len(images)), range(reference - 1, -1, -1)
     with ThreadPoolExecutor() as pool:  # OpenCV and NumPy work side by side
-        views = list(pool.map(partial(View, levels=levels), images, valid or [None] * len(images)))
+        views = list(pool.map(partial(View, levels=levels), images, [None] * len(images) if valid is None else valid))
         chains = pool.map(partial(match_chain, views, reference, max_shift), sides)
         found = {k: pair for chain in chains for k, pair in chain.items()}
         matches, motions = zip(*(found[k] for k in range(len(images))), strict=True)
@@ -138,7 +143,13 @@ def _moved(image, motion: Motion) -> np.ndarray:
 
 
 def unaligned(images) -> Alignment:
-    """The Alignment of P photographs that lie on each other already: nothing is moved, nothing is doubtful."""
+    """The Alignment of P photographs that lie on each other already: nothing is moved, nothing is doubtful.
+
+    images : P arrays (H, W, 3), kept as they are
+
+    >>> unaligned([np.zeros((4, 6, 3), np.uint8)] * 2).shifts.tolist()
+    [[0.0, 0.0], [0.0, 0.0]]
+    """
     count = len(images)
     still = np.zeros((count, 2)), np.zeros(count)
     return Alignment(tuple(images), *still, count // 2, np.zeros(count, dtype=bool), (None,) * count)
@@ -148,8 +159,11 @@ def crop_common(images, shifts, rotations=None) -> tuple[np.ndarray, ...]:
     """The part of aligned photographs that all of them show.
 
     images : P arrays (H, W, ...), aligned
-    shifts, rotations : (P, 2) and (P,), what align_mtb moved and turned them by; None where nothing was turned
+    shifts, rotations : (P, 2) pixels and (P,) degrees, as align_mtb moved them; None where nothing was turned
     Raises ValueError where they have no part in common.
+
+    >>> [image.shape for image in crop_common(np.zeros((2, 4, 6, 3)), shifts=[(0, 0), (2, 1)])]
+    [(3, 4, 3), (3, 4, 3)]
     """
     rotations = np.zeros(len(shifts)) if rotations is None else rotations
     part = common_part(images[0].shape, shifts, rotations)
@@ -159,7 +173,13 @@ def crop_common(images, shifts, rotations=None) -> tuple[np.ndarray, ...]:
 def crop_bracket(bracket: Bracket, alignment: Alignment) -> Bracket:
     """The bracket with its photographs, what is valid in them, and its truth, aligned and cut to their common part.
 
+    alignment : Alignment of the bracket's photographs
     Raises ValueError where the photographs have no part in common.
+
+    >>> bracket = Bracket(np.zeros((2, 4, 6, 3), np.uint8), [0.1, 0.2], ("a", "b"))
+    >>> moved = replace(unaligned(bracket.images), shifts=np.array([(0, 0), (2, 1)]))
+    >>> crop_bracket(bracket, moved).images[0].shape
+    (3, 4, 3)
     """
     place = alignment.shifts, alignment.rotations
     valid, truth = bracket.valid, bracket.truth
@@ -202,7 +222,14 @@ def remove_ghosts(bracket: Bracket, reference: int | None = None) -> Ghosts:
     bracket : Bracket, aligned
     reference : index of the photograph that says where the moving things are; None takes the one that is black or
         white in the fewest pixels of what moves, because there it will speak alone
-    Raises ValueError where there is no such photograph.
+    Returns Ghosts. Raises ValueError where there is no such photograph.
+
+    >>> short = np.arange(20, 110, dtype=np.uint8).repeat(3).reshape(1, 90, 3).repeat(60, axis=0)
+    >>> long = 2 * short
+    >>> short[20:40, 20:40] = 100  # a ball flies by
+    >>> moved = remove_ghosts(Bracket((short, long), [0.1, 0.2], ("a", "b")), reference=1).moved
+    >>> bool(moved[30, 30]), bool(moved[10, 70])
+    (True, False)
     """
     if reference is None:
         reference = _best_seen(bracket)

@@ -89,6 +89,11 @@ def gsolve(Z, B, lam: float, w) -> tuple[np.ndarray, np.ndarray]:
     Returns g, (256,) float64 with g[128] = 0, the log exposure of each pixel value; and log_E, (N,)
     float64, the log irradiance of each pixel, NaN where all its values have weight 0.
     Raises ValueError where shapes or values don't fit.
+
+    >>> Z = np.array([(z, 2 * z) for z in range(10, 120)])  # a linear camera: twice the time, twice the value
+    >>> g, log_E = gsolve(Z, np.log([1, 2]), lam=1.0, w=hat_weights())
+    >>> ((g[[32, 64, 128]] - g[64]) / np.log(2)).round(2).tolist()  # in stops
+    [-1.0, 0.0, 1.0]
     """
     Z, B = np.asarray(Z), np.asarray(B, dtype=np.float64)
     if Z.ndim != 2 or not Z.size or B.shape != Z.shape[1:]:
@@ -183,6 +188,12 @@ def recover_crf(bracket: Bracket, lam: float = 1.0) -> Response:
     Of large brackets every second, third ... pixel each way speaks (_response/evidence.py).
     Returns a Response. Its curves nowhere fall.
     Raises ValueError where nothing ties one pixel value to another, or lam is not positive.
+
+    >>> light = np.geomspace(1, 250, 4800).reshape(60, 80, 1) * np.ones(3)  # and a linear camera:
+    >>> images = [np.uint8(np.minimum(light * t, 255)) for t in (1, 4, 16)]
+    >>> crf = recover_crf(Bracket(images, [1, 4, 16], ("a", "b", "c"))).crf
+    >>> ((crf[:, 128] - crf[:, 64]) / np.log(2)).round(1).tolist()  # twice the value is one stop
+    [1.0, 1.0, 1.0]
     """
     if not lam > 0:
         raise ValueError(f"lam must be positive; got {lam}.")
@@ -213,7 +224,7 @@ def _by_transfers(bracket, lam):
 
 def _by_least_squares(bracket, lam):
     """Curves and errors by gsolve's equations from all pixels that are valid in all photographs, each (3, 256)."""
-    masks = bracket.valid or [None] * len(bracket)
+    masks = [None] * len(bracket) if bracket.valid is None else bracket.valid
     images = [whole_white(in_8_bits(image), mask) for image, mask in zip(bracket.images, masks, strict=True)]
     everywhere = np.ones(images[0].shape[:2], bool) if bracket.valid is None else np.logical_and.reduce(bracket.valid)
     Z = np.stack([image[everywhere] for image in images], axis=1)  # (N, P, 3)
@@ -227,8 +238,14 @@ def _by_least_squares(bracket, lam):
 def crf_opencv(bracket: Bracket, method: str = "debevec") -> np.ndarray:
     """What OpenCV recovers, in this course's form: (3, 256) float64, natural logarithms, crf[:, 128] = 0.
 
+    bracket : Bracket; of 16-bit photographs the upper 8 bits speak
     method : "debevec" (CalibrateDebevec) or "robertson" (CalibrateRobertson), with OpenCV's defaults. Robertson's
         is NaN at values that no photograph holds, and gives white the mean exposure of all clipped pixels
+    Raises KeyError for another method.
+
+    >>> ramp = np.arange(1, 121, dtype=np.uint8).repeat(90).reshape(120, 30, 3)
+    >>> crf_opencv(Bracket((ramp, 2 * ramp), [0.1, 0.2], ("a", "b")))[:, 128].tolist()
+    [0.0, 0.0, 0.0]
     """
     create = {"debevec": cv2.createCalibrateDebevec, "robertson": cv2.createCalibrateRobertson}[method]
     # OpenCV wants float32 times: with float64 Robertson's answers another curve, and says nothing.

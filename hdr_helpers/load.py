@@ -52,6 +52,11 @@ class Bracket:
     truth : Truth where the camera was a virtual one, else None
 
     Raises BracketError where these do not fit each other.
+
+    >>> images = [np.full((2, 3, 3), value, np.uint8) for value in (60, 120)]
+    >>> bracket = Bracket(images, [0.1, 0.2], ("short.jpg", "long.jpg"))
+    >>> (np.diff(bracket.log_times) / np.log(2)).round(6).tolist()  # twice the light is one stop
+    [1.0]
     """
 
     images: tuple[np.ndarray, ...]
@@ -101,7 +106,13 @@ class Bracket:
 
 
 def in_8_bits(image) -> np.ndarray:
-    """The upper 8 bits of a picture: uint8 as it is, uint16 from 0..65535 to 0..255 as uint8."""
+    """The upper 8 bits of a picture: uint8 as it is, uint16 from 0..65535 to 0..255 as uint8.
+
+    image : array of any shape, uint8 or uint16
+
+    >>> in_8_bits(np.array([0, 255, 256, 65535], np.uint16)).tolist()
+    [0, 0, 1, 255]
+    """
     return image if image.dtype == np.uint8 else (image >> 8).astype(np.uint8)
 
 
@@ -116,6 +127,13 @@ def load_bracket(path) -> Bracket:
     exposures: t ISO / N^2.
     Returns a Bracket in ascending time; its notes say what was decided.
     Raises BracketError where the photographs or the times can't be used; nothing is loaded then.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:  # two grey walls, the longer exposure first
+    ...     for name, value in ("wall_0.5.ppm", 120), ("wall_0.25.ppm", 90):
+    ...         _ = Path(folder, name).write_bytes(b"P6 4 3 255 " + bytes([value] * 36))
+    ...     load_bracket(folder).times.tolist()
+    [0.25, 0.5]
     """
     try:
         path = Path(path).expanduser()

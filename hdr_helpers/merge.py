@@ -1,10 +1,7 @@
-"""Stage 4: merge the exposures of a bracket into one radiance map.
+"""Stage 4: merge the exposures of a bracket into one radiance map (Debevec and Malik 1997, equation 6).
 
-After Debevec and Malik 1997, equation 6: the log irradiance of a pixel is the weighted mean of what each
-photograph says of it, ln E = sum_j w(Z_j) (g(Z_j) - ln dt_j) / sum_j w(Z_j).
-
-Both sums depend on a photograph only through its pixel value, so merging is looking up and adding; that, and what the
-photographs say of their own noise, is in the rooms of _merging/.
+The log irradiance of a pixel is the weighted mean of what each photograph says of it, ln E = sum_j w(Z_j) (g(Z_j) -
+ln dt_j) / sum_j w(Z_j). The rooms of _merging/ look both sums up by pixel value, and find the photographs' noise.
 """
 
 import os
@@ -54,8 +51,7 @@ class Merged:
 class Clipping:
     """Shares, 0 to 1, of pixels in which at least one channel can't be used.
 
-    too_dark, too_bright : (P,) float64, for each photograph
-    everywhere_dark, everywhere_bright : share of pixels that are too dark, or too bright, in every one
+    too_dark, too_bright : (P,) float64, for each photograph; everywhere_dark, everywhere_bright : in every one
     """
 
     too_dark: np.ndarray
@@ -67,9 +63,12 @@ class Clipping:
 def clipping(images, valid=None) -> Clipping:
     """How much of each photograph is too dark or too bright to be used, and how much in all of them.
 
-    images : P arrays (H, W, 3) uint8 or uint16, shortest exposure first
-    valid : P arrays (H, W) bool, the pixels that count, or None for all
-    Usable is what fitted_weights gives a weight. Shares are of the pixels that are valid in every photograph.
+    images, valid : as for merge_debevec, shortest exposure first
+    Usable is what fitted_weights gives a weight. Returns shares of the pixels that are valid in every photograph.
+
+    >>> half_white = np.uint8([[[100] * 3, [255] * 3]])
+    >>> clipping([half_white, half_white]).too_bright.tolist()
+    [0.5, 0.5]
     """
     inside = np.s_[:, :] if valid is None else np.logical_and.reduce(valid)
     pixels = [in_8_bits(image)[inside].reshape(-1, 3) for image in images]
@@ -87,19 +86,20 @@ def merge_debevec(images, times, crf, w=None, valid=None, mean: str | None = Non
     times : (P,) exposure times in seconds
     crf : (3, 256) float, log inverse response of each channel; for 16 bits it is interpolated
     w : weight of each pixel value, (256,), (3, 256), (P, 1, 256) or (P, 3, 256) float, none negative. None takes
-        1 / variance by the noise that the bracket itself shows (_merging/noise.py), and takes almost white pixels
-        that touch white for clipped where white is frayed, as by JPEG
+        1 / variance by the noise that the bracket shows (_merging/noise.py); white that JPEG frayed counts as clipped
     valid : P arrays (H, W) bool, False where a photograph has no say; None lets all speak everywhere
     mean : of what. "log", equation 6: of ln E. Errors count as shares, but noise in the dark, whose logarithm falls
-        farther than it rises, pulls down, and a value of 0 can't be used. "linear": of E. True on average in the
-        dark, but a short exposure's noise is divided by a short time, so weights have to grow with its square.
-        "log1p": of ln(1 + E T), T the longest time: the one where errors are shares, the other where they are not.
-        None takes "log1p" with the weights by noise and "log" with given ones
-
+        farther than it rises, pulls down, and 0 can't be used. "linear": of E. True on average in the dark, but a short
+        exposure's noise is divided by a short time: weights have to grow with its square. "log1p": of ln(1 + E T), T
+        the longest time: a logarithm in the light, E in the dark. None: "log1p" with weights by noise, else "log"
     Returns a Merged. Where no weight is above 0 a pixel gets the nearest bound: what the shortest exposure says if it
-    is clipped in all of them, what the longest says if it is black, so that the brightest part of a scene stays the
-    brightest. Where no photograph is valid it is as dark as the darkest pixel.
-    Raises ValueError where shapes or values don't fit.
+    is clipped in all, what the longest says if it is black, so that the brightest part of a scene stays the brightest.
+    Where no photograph is valid it is as dark as the darkest pixel. Raises ValueError where shapes or values don't fit.
+
+    >>> ramp, crf = np.uint8([[[20] * 3, [40] * 3, [80] * 3]]), np.log(np.arange(256) + 1e-9)  # a linear camera
+    >>> E = merge_debevec([ramp, 2 * ramp], [0.1, 0.2], [crf] * 3, np.ones(256)).radiance
+    >>> (E / E.min())[0, :, 0].round(3).tolist()
+    [1.0, 2.0, 4.0]
     """
     images, times, crf, w, valid = _checked(images, times, crf, w, valid)
     mean = mean or ("log1p" if w is None else "log")
@@ -144,9 +144,8 @@ MEANS = {"log": _log, "linear": _linear, "log1p": _log1p}
 def weights_by_noise(images, times, crf, valid=None, mean: str = "log1p") -> tuple[np.ndarray, bool]:
     """What merge_debevec weighs photographs by where no weights are given.
 
-    Arguments as for merge_debevec, photographs in ascending order of their times.
-    Returns 1 / variance of what is averaged, (P, 3, 256) float64; and whether white is frayed: clipped pixels hide
-    behind other values than 255.
+    Arguments as for merge_debevec, photographs in ascending order of their times. Returns 1 / variance of what is
+    averaged, (P, 3, 256) float64; and whether white is frayed: clipped pixels hide behind other values than 255.
     """
     few, masks = evidence(images, valid)
     joints = joint_histograms(few, masks, [(k, k + 1) for k in range(len(few) - 1)])
@@ -213,9 +212,8 @@ def _checked(images, times, crf, w, valid):
 def merge_opencv(images, times, crf=None) -> np.ndarray:
     """OpenCV's MergeDebevec behind this course's conventions: any float times, crf (3, 256), radiance out.
 
-    Returns radiance, (H, W, 3) float32, in the channel order of images. Where every photograph is clipped
-    the result may be 0 or not finite: that is OpenCV's own answer. Without crf OpenCV takes the camera for a
-    linear one.
+    Returns radiance, (H, W, 3) float32, in the channel order of images. Where every photograph is clipped it may be 0
+    or not finite: that is OpenCV's own answer. Without crf OpenCV takes the camera for a linear one.
     """
     images, merge = [np.ascontiguousarray(in_8_bits(image)) for image in images], cv2.createMergeDebevec()
     times = np.asarray(times, dtype=np.float32)  # with float64 it answers zeros and infinities, and says nothing
@@ -227,8 +225,8 @@ def merge_opencv(images, times, crf=None) -> np.ndarray:
 def write_hdr(path, radiance) -> None:
     """Write a radiance map as Radiance RGBE (.hdr) or, where OpenCV was built with it, OpenEXR (.exr).
 
-    radiance : (H, W, 3) float, RGB, finite and not negative. The file is complete or not there. RGBE keeps about 1% of
-    the strongest channel; OpenEXR (32-bit) all of it. np.save keeps it, too, where only Python is to read it.
+    radiance : (H, W, 3) float, RGB, finite and not negative. The file at path is complete or not there. RGBE keeps
+    about 1% of the strongest channel; OpenEXR (32-bit) all of it, as np.save does where only Python is to read it.
     Raises ValueError where the radiance can't be stored, or the format is not one of these.
     """
     path, radiance = Path(path), np.asarray(radiance)
@@ -252,7 +250,7 @@ def radiance_formats() -> list[str]:
 
 
 def write_whole(path, data: bytes) -> None:
-    """Write a file so that it is either complete or not there: first beside its place, then into it."""
+    """Write data to path so that the file is either complete or not there: first beside its place, then into it."""
     part = Path(path).with_name(Path(path).name + ".part")
     try:
         part.write_bytes(data)

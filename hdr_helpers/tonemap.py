@@ -37,7 +37,11 @@ RANGES = {
 
 
 def luminance(radiance) -> np.ndarray:
-    """(H, W) float32, relative luminance of an RGB radiance map (H, W, 3)."""
+    """(H, W) float32, relative luminance of an RGB radiance map (H, W, 3): the weights of Rec. 709.
+
+    >>> luminance([[[3, 3, 3]]]).round(3).tolist()
+    [[3.0]]
+    """
     return np.asarray(radiance, dtype=np.float32) @ LUMINANCE
 
 
@@ -46,7 +50,9 @@ def dynamic_range_stops(radiance) -> float:
 
     Percentiles, because a single noisy pixel would decide the ratio of maximum and minimum. Pixels without
     light, which OpenCV's merge leaves where it knows nothing, do not count, nor do those that are no number.
-    Raises ValueError where no pixel has light.
+    radiance : (H, W, 3) float, RGB. Raises ValueError where no pixel has light.
+    >>> round(dynamic_range_stops(np.repeat([1.0, 1024.0], 3000).reshape(20, 100, 3)), 1)  # 2^10
+    10.0
     """
     light = luminance(radiance)
     light = light[np.isfinite(light) & (light > 0)]
@@ -64,6 +70,10 @@ def tonemap(radiance, operator: str = "durand", **parameters) -> np.ndarray:
     operator : a name in OPERATORS; parameters are that operator's own, in the RANGES of this file
     Returns ldr, (H, W, 3) float32 in 0..1, RGB, gamma included. The same call gives the same picture.
     Raises ValueError for an unknown operator or parameter, a value out of range, or a map that is none.
+
+    >>> grey = np.ones((1, 3, 3)) * [[[0.25], [0.5], [1]]]
+    >>> tonemap(grey, "gamma", gamma=1, stops=1)[0, :, 0].round(2).tolist()  # a stop more: the middle is white
+    [0.5, 1.0, 1.0]
     """
     if operator not in OPERATORS:
         raise ValueError(f"Unknown operator {operator!r}; there are {', '.join(sorted(OPERATORS))}.")
@@ -76,7 +86,14 @@ def tonemap(radiance, operator: str = "durand", **parameters) -> np.ndarray:
 
 
 def check_parameters(operator: str, parameters: dict) -> None:
-    """Raise ValueError for the first parameter that the operator does not have, or whose value is out of range."""
+    """Raise ValueError for the first parameter that the operator does not have, or whose value is out of range.
+
+    operator : a name in OPERATORS; parameters : dictionary from name to value
+
+    >>> check_parameters("gamma", {"gama": 2.2})
+    Traceback (most recent call last):
+    ValueError: gamma has no parameter 'gama'; it has gamma, stops.
+    """
     known = dict(list(inspect.signature(OPERATORS[operator]).parameters.items())[1:])
     for name, value in parameters.items():
         if name not in known:
@@ -94,6 +111,9 @@ def expose_for_screen(radiance) -> np.ndarray:
     What is brighter is cut there. OpenCV's operators scale linearly to the maximum first, so that one
     absurdly bright pixel would darken all others.
     Raises ValueError for what is no radiance map.
+
+    >>> expose_for_screen(np.ones((1, 2, 3)) * [[[4], [8]]])[0, :, 0].round(2).tolist()
+    [0.5, 1.0]
     """
     radiance = np.asarray(radiance)
     if radiance.ndim != 3 or radiance.shape[2] != 3 or not radiance.size or radiance.dtype.kind not in "fiu":
@@ -118,8 +138,11 @@ def expose_for_screen(radiance) -> np.ndarray:
 def tonemap_gamma(radiance, gamma: float = 2.2, stops: float = 0.0) -> np.ndarray:
     """Gamma alone, the baseline: clip and encode.
 
+    radiance : as from expose_for_screen; returns (H, W, 3) float32 in 0..1
     gamma : 0.1..10; 1 leaves the light linear, more brightens the mid-tones
     stops : -30..30; exposure compensation, +1 is twice as bright, and twice as bright a pixel is clipped
+    >>> tonemap_gamma(np.float32([0.25, 1]), gamma=2).tolist()  # the root
+    [0.5, 1.0]
     """
     return np.clip(radiance * np.float32(2.0**stops), 0, 1) ** np.float32(1 / gamma)
 
@@ -127,10 +150,14 @@ def tonemap_gamma(radiance, gamma: float = 2.2, stops: float = 0.0) -> np.ndarra
 def tonemap_reinhard(radiance, gamma=2.2, intensity=1.0, light_adapt=0.5, color_adapt=0.0) -> np.ndarray:
     """Reinhard and Devlin 2005, a model of how photoreceptors adapt, by OpenCV. One curve for all pixels.
 
+    radiance : as from expose_for_screen; returns (H, W, 3) float32
     gamma : 0.1..10; above 1 brightens
     intensity : -8..8; more is brighter
     light_adapt : 0..1; 0 adapts to the whole picture, 1 to each pixel alone (flatter)
     color_adapt : 0..1; 0 adapts all channels alike, 1 each on its own (removes a colour cast, and colours)
+    >>> wall = np.float32([[[0.02] * 3, [1] * 3]])
+    >>> bool(tonemap_reinhard(wall, intensity=2)[0, 0, 0] > tonemap_reinhard(wall)[0, 0, 0])
+    True
     """
     # A new object for every picture: OpenCV's changes its own state, the second call differs.
     return through_opencv(cv2.createTonemapReinhard(gamma, intensity, light_adapt, color_adapt), radiance)
@@ -139,11 +166,15 @@ def tonemap_reinhard(radiance, gamma=2.2, intensity=1.0, light_adapt=0.5, color_
 def tonemap_drago(radiance, gamma=2.2, saturation=0.8, bias=0.85) -> np.ndarray:
     """Drago, Myszkowski, Annen and Chiba 2003, a logarithm whose base follows the pixel, by OpenCV.
 
+    radiance : as from expose_for_screen; returns (H, W, 3) float32
     gamma : 0.1..10; above 1 brightens
     saturation : 0..2; 0 is grey, 1 keeps colour ratios, which look too strong once luminance is compressed
     bias : 0.5..1; less lifts the dark parts. 0.8 to 0.9 are usual; below, the very brightest darken again
 
     OpenCV sees luminance alone: its own saturation is a power that turns bright colours white.
+    >>> red = np.float32([[[0.2, 0.1, 0.1], [1, 0.5, 0.5]]])
+    >>> np.ptp(tonemap_drago(red, saturation=0), axis=2).round(3).tolist()  # its channels are equal
+    [[0.0, 0.0]]
     """
     light = np.maximum(luminance(radiance), LEAST)
     shown = through_opencv(cv2.createTonemapDrago(1.0, 1.0, bias), cv2.merge([light] * 3))[..., 1]
@@ -153,12 +184,16 @@ def tonemap_drago(radiance, gamma=2.2, saturation=0.8, bias=0.85) -> np.ndarray:
 def tonemap_mantiuk(radiance, gamma=2.2, scale=None, saturation=0.8) -> np.ndarray:
     """Mantiuk, Myszkowski and Seidel 2006, contrasts compressed in a pyramid, by OpenCV.
 
+    radiance : as from expose_for_screen; returns (H, W, 3) float32
     gamma : 0.1..10; above 1 brightens
     scale : 0.05..1; factor on local contrast as it is perceived: less is flatter, and lifts the dark parts.
         None takes what leaves a contrast of 30 between the scene's darkest and brightest
     saturation : 0..2; 0 is grey, 1 keeps colour ratios, which look too strong once luminance is compressed
 
     As OpenCV scales the contrasts of all levels alike, the whole is a power of luminance: a global operator.
+    >>> scene = np.geomspace(1e-4, 1, 32, dtype=np.float32).repeat(12).reshape(1, 128, 3)
+    >>> bool(np.ptp(tonemap_mantiuk(scene, scale=0.1)) < np.ptp(tonemap_mantiuk(scene, scale=0.9)))
+    True
     """
     light = np.maximum(luminance(radiance), LEAST)
     if scale is None:
@@ -178,6 +213,9 @@ def through_opencv(operator, radiance) -> np.ndarray:
     then black in all channels becomes NaN (0 / 0), which spoils the whole picture if it is the first one. So
     no pixel is black, and one row and one column more, cut off again, hold a 0 in a single channel. They also
     let Mantiuk's pyramid stand on a single pixel.
+    operator : as cv2.createTonemap... gives it; radiance : (H, W, 3) float32. Returns (H, W, 3) float32.
+    >>> through_opencv(cv2.createTonemap(1.0), np.float32([[[0.5] * 3, [1] * 3]]))[0, :, 0].round(2).tolist()
+    [0.5, 1.0]
     """
     safe = cv2.copyMakeBorder(radiance, 0, 1, 0, 1, cv2.BORDER_REPLICATE)
     np.maximum(safe, LEAST, out=safe)
@@ -196,14 +234,22 @@ OPERATORS = {
 
 
 def to_8bit(ldr) -> np.ndarray:
-    """(H, W, 3) uint8 from a picture in 0..1. Clipped first: 1.02 * 255 as uint8 would be 4."""
+    """(H, W, 3) uint8 from a picture ldr, (H, W, 3) float in 0..1. Clipped first: 1.02 * 255 as uint8 would be 4.
+
+    >>> to_8bit([0.0, 0.2, 1.02]).tolist()
+    [0, 51, 255]
+    """
     return np.rint(np.clip(ldr, 0, 1) * 255).astype(np.uint8)
 
 
 def write_picture(path, ldr) -> None:
-    """Write a tone-mapped picture, (H, W, 3) float in 0..1, RGB, as .png or .jpg: 24 bits a pixel.
+    """Write a tone-mapped picture ldr, (H, W, 3) float in 0..1, RGB, as .png or .jpg: 24 bits a pixel.
 
-    The file is complete or not there. Raises ValueError for another file name.
+    The file at path is complete or not there. Raises ValueError for another file name.
+
+    >>> write_picture("window.tiff", np.ones((2, 3, 3)))
+    Traceback (most recent call last):
+    ValueError: window.tiff: pictures are written as .png or .jpg.
     """
     path = Path(path)
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):

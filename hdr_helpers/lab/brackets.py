@@ -28,7 +28,10 @@ HANDHELD_NAMES = tuple(f"IMG_04{n}.jpg" for n in range(12, 17))
 
 
 def make_chapel(folder) -> None:
-    """Shoot the chapel from a tripod and write photographs, shutter.txt and truth.npz into a folder."""
+    """Shoot the chapel from a tripod and write photographs, shutter.txt and truth.npz into a folder.
+
+    folder : where to; made if it is not there. Nine JPEG files of (512, 768, 3), times as in CHAPEL_TIMES.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     camera = Camera(jpeg_quality=None)  # compressed once, when it is written
@@ -44,7 +47,10 @@ def make_chapel(folder) -> None:
 
 
 def make_handheld(folder) -> None:
-    """Shoot the cloister from the hand while the monks walk; photographs with EXIF and truth.npz into a folder."""
+    """Shoot the cloister from the hand while the monks walk; photographs with EXIF and truth.npz into a folder.
+
+    folder : where to; made if it is not there. Five JPEG files of (512, 768, 3), times as in HANDHELD_TIMES.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     bracket = shoot_handheld(Camera(jpeg_quality=None))
@@ -57,6 +63,7 @@ def make_handheld(folder) -> None:
 def shoot_handheld(camera: Camera) -> Bracket:
     """The bracket of data/handheld, by any camera: (512, 768, 3) each.
 
+    camera : Camera
     Its truth is the moment of the shortest exposure, the only one in which the sunlit floor is not white.
     """
     moments, times = cloister_scene(), [float(t) for t in HANDHELD_TIMES]

@@ -15,7 +15,11 @@ RESULTS = Path(os.environ.get("HDR_RESULTS", "results"))
 def keep(name: str, array, made_by=None) -> None:
     """Save a result of yours for the next notebooks, as results/NAME.npy.
 
+    name : without suffix; array : float, any shape; carry takes no integers
     made_by : the function that made it; what the course's own made in the place of a TODO's is not kept
+
+    >>> keep("example", np.zeros((3, 256)))
+    Kept for the next notebooks: example.npy
     """
     if hasattr(made_by, "in_place_of"):  # as checks mark the course's function
         print(f"Not kept: the course's own {made_by.__name__} made this {name}.")
@@ -30,7 +34,14 @@ def keep(name: str, array, made_by=None) -> None:
 def carry(name: str, shape: tuple, otherwise):
     """Your own result of an earlier notebook, or what otherwise() computes where there is none.
 
+    name : as it was kept
     shape : what it must have; a result of another shape, or with values that are not finite, is not used
+    otherwise : function without arguments
+    Says in a printed line which of the two it is. A file that can't be used is no error.
+
+    >>> carry("never_kept", (2,), otherwise=lambda: np.ones(2)).tolist()
+    The course's own never_kept.
+    [1.0, 1.0]
     """
     path = RESULTS / f"{name}.npy"
     if path.is_file():

@@ -18,20 +18,37 @@ DATA = Path(__file__).parents[2] / "data"
 
 @cache
 def handheld() -> Bracket:
-    """The cloister, five JPEG photographs shot from the hand while two monks walk, with their truth."""
+    """The cloister, five JPEG photographs shot from the hand while two monks walk, with their truth.
+
+    Each (512, 768, 3) uint8, from 1/3200 s to 1/30 s; read once. Raises BracketError where they are not there.
+
+    >>> bool(handheld().truth.moved.any())
+    True
+    """
     return with_truth(load_bracket(DATA / "handheld"), DATA / "handheld")
 
 
 @cache
 def chapel() -> Bracket:
-    """The chapel, nine JPEG photographs from 1/400 s to 4 s, shot by the virtual camera, with their truth."""
+    """The chapel, nine JPEG photographs from 1/400 s to 4 s, shot by the virtual camera, with their truth.
+
+    Each (512, 768, 3) uint8; read once. Raises BracketError where they are not there.
+
+    >>> len(chapel()), chapel().times[[0, -1]].tolist()
+    (9, [0.0025, 4.0])
+    """
     return with_truth(load_bracket(DATA / "chapel"), DATA / "chapel")
 
 
 def with_truth(bracket: Bracket, folder) -> Bracket:
     """The same bracket with the truth of folder/truth.npz, or as it is where there is no such file.
 
+    bracket : Bracket; folder : path
     Raises BracketError where the file is not the truth of these photographs.
+
+    >>> photographs = replace(chapel(), truth=None)
+    >>> with_truth(photographs, DATA / "chapel").truth.crf.shape, with_truth(photographs, DATA).truth
+    ((3, 256), None)
     """
     path = Path(folder) / "truth.npz"
     if not path.is_file():
@@ -50,8 +67,15 @@ def with_truth(bracket: Bracket, folder) -> Bracket:
 def what_loading_says(bracket_folder, times: dict) -> list[str]:
     """What load_bracket has to say of a folder's photographs if a list gave them other times.
 
+    bracket_folder : path
     times : from file name to what the list holds
-    Copies are loaded and thrown away; the folder stays as it is.
+    Copies are loaded and thrown away; the folder stays as it is. Returns the notes, or what the error says.
+
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name in ("a.ppm", "b.ppm"):
+    ...         _ = Path(folder, name).write_bytes(b"P6 4 3 255 " + bytes([100] * 36))
+    ...     what_loading_says(folder, {"a.ppm": "1/60", "b.ppm": "soon"})[0].startswith("BracketError")
+    True
     """
     with tempfile.TemporaryDirectory() as folder:
         for name in times:
@@ -67,8 +91,15 @@ def what_loading_says(bracket_folder, times: dict) -> list[str]:
 def save_truth(folder, truth: Truth, scale: float) -> None:
     """Write folder/truth.npz: radiance / scale as float16, crf as float64, shifts, and rotations and moved if known.
 
+    folder : path; truth : Truth with shifts; scale : as float16 ends at 65504, brighter scenes need one
     The same bytes everywhere, so neither np.savez, which writes the name of the system, nor a compressor,
     which would save a tenth and depends on its version.
+
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_truth(folder, chapel().truth, scale=4)
+    ...     again = with_truth(replace(chapel(), truth=None), folder).truth
+    >>> bool(np.all(again.radiance == chapel().truth.radiance))
+    True
     """
     half = (truth.radiance / scale).astype(np.float16)
     arrays = {"radiance": half, "scale": np.float32(scale), "crf": truth.crf, "shifts": truth.shifts}

@@ -37,7 +37,7 @@ class ClippedShare(NamedTuple):
 
 
 class DetailKept(NamedTuple):
-    """How much of the scene's detail a picture shows, 0 to 1, where the scene is darkest and where it is brightest."""
+    """How much of the scene's detail a picture shows, 0 to 1: dark, where the scene is darkest; bright, brightest."""
 
     dark: float
     bright: float
@@ -53,7 +53,7 @@ class Tmqi(NamedTuple):
 
 @dataclass(frozen=True)
 class Judgement:
-    """Everything this file can say of a picture."""
+    """Everything this file can say of a picture: what is clipped, how much detail is left, and its tmqi."""
 
     clipped: ClippedShare
     detail: DetailKept
@@ -63,7 +63,7 @@ class Judgement:
 def judge(ldr, radiance) -> Judgement:
     """Judge a picture ldr (H, W, 3) in 0..1 by the radiance map (H, W, 3) that it was made from.
 
-    Raises ValueError where the two differ in size, or are narrower than TMQI needs (161 pixels).
+    Raises ValueError where the two differ in size, are narrower than TMQI needs (161 pixels), or have no light.
     """
     return Judgement(clipped_share(ldr), detail_kept(ldr, radiance), tmqi(ldr, radiance))
 
@@ -73,6 +73,9 @@ def clipped_share(ldr) -> ClippedShare:
 
     ldr : (H, W, 3) float in 0..1. A channel at 0 beside others is a strong colour, so black needs all three; a channel
     at 255 is cut, and its detail and the hue are gone. Pure red counts as white, therefore.
+
+    >>> tuple(clipped_share([[[0, 0, 0], [1, 0, 0], [0.5, 0.5, 0.5], [0, 0, 0.5]]]))
+    (0.25, 0.25)
     """
     pixels = to_8bit(ldr).reshape(-1, 3)
     return ClippedShare(float((pixels == 0).all(axis=1).mean()), float((pixels == 255).any(axis=1).mean()))
@@ -82,6 +85,11 @@ def extreme_regions(radiance, share: float = REGION) -> tuple[np.ndarray, np.nda
     """Two (H, W) bool: the darkest and the brightest part of a scene, share per cent of its pixels each.
 
     Luminance is smoothed first, in logarithms: a region is a place in the scene, not the dark grains of a bright wall.
+    radiance : (H, W, 3) float, RGB. Raises ValueError where it has no light.
+
+    >>> darkest, brightest = extreme_regions(np.arange(1, 21).repeat(60).reshape(20, 20, 3), share=10)
+    >>> bool(darkest[0].all()), bool(brightest[0].any())
+    (True, False)
     """
     smooth = _smooth(_log_light(radiance))
     low, high = np.percentile(smooth, [share, 100 - share])
@@ -93,7 +101,6 @@ def detail_kept(ldr, radiance, share: float = REGION) -> DetailKept:
 
     ldr : (H, W, 3) float in 0..1; radiance : (H, W, 3) float, RGB; light that is no number or not above 0 counts as
         the darkest
-
     In a small window round each pixel the log luminance of the scene is compared with the picture's grey levels:
     covariance / (scene's deviation * picture's deviation), a correlation in which half a grey level more or less is
     not taken for detail. A reversed contrast counts as lost. The mean is weighted by the scene's contrast, as a plain
@@ -101,6 +108,11 @@ def detail_kept(ldr, radiance, share: float = REGION) -> DetailKept:
 
     1 says that every structure is there, however faint as long as it is visible; a picture that exaggerates detail
     gets no less, nor does one with halos wider than the window. A region without contrast has lost nothing: 1.
+    Raises ValueError where the two differ in size, or have no light.
+
+    >>> scene = np.random.default_rng(0).uniform(0.1, 0.9, (40, 40, 3))
+    >>> detail_kept(np.zeros_like(scene), scene), detail_kept(scene, scene).bright > 0.9
+    (DetailKept(dark=0.0, bright=0.0), True)
     """
     log_light, grey = _log_light(radiance), _grey(ldr)
     _check_alike(grey, log_light)
@@ -131,10 +143,13 @@ def tmqi(ldr, radiance) -> Tmqi:
     ldr : (H, W, 3) float in 0..1; radiance : (H, W, 3) float, RGB, linear; any scale, negative values count as 0
     Quality is 0.8012 fidelity^0.3046 + 0.1988 naturalness^0.7088.
     Raises ValueError where the two differ in size or a side is below 161 pixels.
-
     The constants are those of the authors' own program, version 1.0. They were fitted to opinions on a few scenes:
     differences below 0.01 mean little. Naturalness asks for the brightness and contrast of an average photograph; a
     night scene shown as night scores low.
+
+    >>> scene = np.random.default_rng(0).uniform(0.1, 1, (161, 161, 3))
+    >>> tmqi(scene, scene).quality > tmqi(scene / 10, scene).quality
+    True
     """
     fidelity, naturalness = structural_fidelity(ldr, radiance), statistical_naturalness(ldr)
     return Tmqi(0.8012 * fidelity**0.3046 + (1 - 0.8012) * naturalness**0.7088, fidelity, naturalness)
@@ -146,6 +161,10 @@ def structural_fidelity(ldr, radiance) -> float:
     Arguments and errors as for tmqi. The radiance map's luminance is scaled linearly to 0..2^32 - 1, as the authors do:
     that makes nearly all of its structure visible, and leaves out scale and offset. A scale on which the picture shows
     the opposite of the scene counts as 0.
+
+    >>> scene = np.random.default_rng(0).uniform(0.1, 1, (161, 161, 3))
+    >>> structural_fidelity(scene, scene) > 0.9, structural_fidelity(1 - scene, scene) < 0.1
+    (True, True)
     """
     scene, picture = _light(radiance), _grey(ldr)
     _check_alike(picture, scene)
@@ -164,6 +183,7 @@ def local_fidelity(picture, scene, frequency: float) -> np.ndarray:
     """Structural fidelity of each window of 11 x 11 pixels on one scale.
 
     picture, scene : (H, W) float64; frequency : cycles a degree at which this scale is seen
+    Returns (H - 10, W - 10) float64.
     """
     deviations, means = [], []
     for values in (scene, picture):
@@ -188,6 +208,9 @@ def statistical_naturalness(ldr) -> float:
     ldr : (H, W, 3) float in 0..1. Mean grey level against a normal distribution, mean deviation in blocks of 11 x 11
     pixels against a beta distribution. Blocks that don't fit in whole are left out, where the authors fill up with
     black. Raises ValueError for a picture smaller than a block.
+
+    >>> round(statistical_naturalness(np.full((22, 22, 3), 0.5)), 6)  # no contrast at all
+    0.0
     """
     grey = _grey(ldr)
     rows, cols = (n // 11 for n in grey.shape)

@@ -32,6 +32,11 @@ def radiance_error(radiance, truth, where=None) -> RadianceError:
 
     Radiance is relative, and the gauge g[128] = 0 leaves each channel a scale of its own, so the median
     error of each channel is taken off first.
+    Returns a RadianceError.
+
+    >>> truth = np.geomspace(0.01, 100, 48).reshape(4, 4, 3)
+    >>> round(radiance_error(7 * truth, truth).median, 3)  # no scale
+    0.0
     """
     radiance, truth = np.asarray(radiance, dtype=np.float32), np.asarray(truth, dtype=np.float32)
     with np.errstate(all="ignore"):
@@ -47,6 +52,10 @@ def crf_rmse(crf, truth, low: int = 5, high: int = 250) -> np.ndarray:
     """(3,) float64: root mean square error of log inverse responses in stops, over low <= z <= high.
 
     crf, truth : (3, 256) natural logarithms. The gauge is removed: each error's mean is taken off.
+
+    >>> truth = np.tile(np.linspace(-5, 1, 256), (3, 1))
+    >>> crf_rmse(truth + [[0], [1], [2]], truth).round(6).tolist()
+    [0.0, 0.0, 0.0]
     """
     error = (np.asarray(crf, dtype=np.float64) - truth)[:, low : high + 1] / np.log(2)
     return np.sqrt(np.mean((error - error.mean(axis=1, keepdims=True)) ** 2, axis=1))
@@ -56,6 +65,12 @@ def psnr_mu(radiance, truth, mu: float = 5000.0) -> float:
     """PSNR in dB after mu-law compression, as in the NTIRE 2021 HDR challenge.
 
     radiance, truth : (H, W, 3) float. One scale a channel is removed; the truth's 99th percentile is 1.
+    mu : how strongly light is compressed. Infinite where nothing else differs.
+
+    >>> truth = np.repeat([0.02, 1, 1], 30).reshape(3, 10, 3)
+    >>> dark, light = truth - [[[0.01]], [[0]], [[0]]], truth - [[[0]], [[0.01]], [[0]]]
+    >>> psnr_mu(dark, truth) < psnr_mu(light, truth)  # the same error counts for more in the dark
+    True
     """
     radiance, truth = _same_scale(radiance, truth)
     white = np.percentile(truth, 99)
@@ -70,6 +85,12 @@ def psnr_l(radiance, truth) -> float:
     """PSNR in dB of the light itself, as in the NTIRE 2021 HDR challenge: the brightest pixels decide it.
 
     radiance, truth : (H, W, 3) float. One scale a channel is removed; the truth's largest value is 1.
+    Infinite where nothing else differs.
+
+    >>> radiance = np.ones((10, 10, 3))
+    >>> radiance[0, 0] = 0.9  # one pixel of a hundred is wrong by a tenth: the mean square is 1 / 10,000
+    >>> round(psnr_l(radiance, np.ones((10, 10, 3))), 3)
+    40.0
     """
     radiance, truth = _same_scale(radiance, truth)
     return float(-10 * np.log10(np.mean(((radiance - truth) / truth.max()) ** 2)))
@@ -87,9 +108,19 @@ def _same_scale(radiance, truth):
 def held_out(bracket, k: int, merge) -> tuple[np.ndarray, np.ndarray]:
     """Predict one photograph of a bracket from the others: a check that needs no truth.
 
+    bracket : Bracket of at least three photographs; k : index of the one that is held out
     merge : from a Bracket to (radiance, crf); it gets the bracket without photograph k
     Returns the prediction, (H, W, 3) float64 pixel values with fractions, 0..255; and by how much the photograph is
     brighter, (H, W, 3) float64, NaN where it or the prediction is black, clipped or not valid.
+    Raises BracketError where fewer than two photographs are left.
+
+    >>> from hdr_helpers.load import Bracket
+    >>> images = [np.full((2, 3, 3), value, np.uint8) for value in (20, 40, 80)]
+    >>> bracket = Bracket(images, [0.1, 0.2, 0.4], ("a", "b", "c"))
+    >>> crf = np.log(np.maximum(np.arange(256), 0.5)) * np.ones((3, 1))  # a linear camera
+    >>> predicted, brighter = held_out(bracket, 2, lambda rest: (rest.images[0] / rest.times[0], crf))
+    >>> predicted[0, 0].round(6).tolist()  # four times the time of the first
+    [80.0, 80.0, 80.0]
     """
     others = [i for i in range(len(bracket)) if i != k]
     valid = None if bracket.valid is None else tuple(bracket.valid[i] for i in others)
@@ -113,7 +144,16 @@ def held_out(bracket, k: int, merge) -> tuple[np.ndarray, np.ndarray]:
 
 
 def one_photo_errors(bracket) -> list[tuple[RadianceError, RadianceError]]:
-    """For each photograph the RadianceError of two guesses: by a gamma of 2.2, and by the camera's true curve."""
+    """For each photograph the RadianceError of two guesses: by a gamma of 2.2, and by the camera's true curve.
+
+    bracket : Bracket of uint8 with its Truth
+
+    >>> from hdr_helpers.lab.camera import Camera
+    >>> scene = np.geomspace(0.01, 1, 300).reshape(10, 10, 3)
+    >>> by_gamma, by_curve = one_photo_errors(Camera(jpeg_quality=None).shoot(scene, [0.1, 0.2]))[0]
+    >>> by_gamma.median > by_curve.median
+    True
+    """
     crf, truth = bracket.truth.crf, bracket.truth.radiance
     errors = []
     for image in bracket.images:
@@ -129,6 +169,12 @@ def misplacement(bracket, alignment) -> np.ndarray:
     bracket : with the truth of its shifts; alignment : what align_mtb found for its images
     The larger of dx and dy, at the 90th percentile of the pixels that are neither black nor white in the photograph:
     what it does not show can't be in the wrong place.
+
+    >>> from hdr_helpers.align import unaligned
+    >>> from hdr_helpers.lab.camera import Camera
+    >>> bracket = Camera(jpeg_quality=None).shoot(np.ones((40, 60, 3)), [0.1, 0.2], shifts=[(3, 1), (0, 0)])
+    >>> misplacement(bracket, unaligned(bracket.images)).round(6).tolist()
+    [3.0, 0.0]
     """
     truth, count = bracket.truth, len(bracket)
     turns = np.zeros(count) if truth.rotations is None else truth.rotations
@@ -147,7 +193,7 @@ def misplacement(bracket, alignment) -> np.ndarray:
 
 @dataclass(frozen=True)
 class MovingError:
-    """Mean absolute error of a radiance map in stops: where the scene moved, and well away from there."""
+    """Mean absolute error of a radiance map in stops: moving where the scene moved, still well away from there."""
 
     moving: float
     still: float
@@ -158,6 +204,15 @@ def moving_error(radiance, truth) -> MovingError:
 
     radiance : (H, W, 3) float; truth : Truth with radiance and moved
     One scale for each channel is removed, the median over what stood still: ghosts must not hide in it.
+    Returns a MovingError.
+
+    >>> from hdr_helpers.load import Truth
+    >>> moved = np.zeros((20, 20), dtype=bool)
+    >>> moved[:5, :5] = True
+    >>> truth = Truth(np.ones((20, 20, 3)), crf=None, moved=moved)
+    >>> error = moving_error(truth.radiance + moved[..., None], truth)
+    >>> error.moving, error.still  # a ghost twice as bright
+    (1.0, 0.0)
     """
     near = cv2.dilate(truth.moved.view(np.uint8), np.ones((9, 9), np.uint8)) > 0
     with np.errstate(all="ignore"):

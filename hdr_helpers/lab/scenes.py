@@ -14,7 +14,14 @@ CHAPEL_SCALE, CLOISTER_SCALE = 8, 4  # of the radiance in data/scenes
 
 
 def lens(radiance, sigma: float = 0.6) -> np.ndarray:
-    """What a lens makes of scene radiance (H, W, 3): a little blur (sigma in pixels). Float64."""
+    """What a lens makes of scene radiance (H, W, 3): a little blur (sigma in pixels). Float64.
+
+    >>> lamp = np.zeros((9, 9, 3))
+    >>> lamp[4, 4] = 100
+    >>> seen = lens(lamp)
+    >>> round(seen.sum().item(), 6), bool(seen[4, 4, 0] < 100)  # its light is spread, and all there
+    (300.0, True)
+    """
     return gaussian_filter(np.asarray(radiance, dtype=np.float64), (sigma, sigma, 0), mode="nearest")
 
 
@@ -22,6 +29,9 @@ def chapel_scene() -> np.ndarray:
     """The chapel behind the lens, (560, 816, 3) float32, relative radiance, RGB; nothing moves.
 
     Rounded to what a truth file holds, so that the stored truth is exactly what the sensor saw.
+
+    >>> chapel_scene().shape
+    (560, 816, 3)
     """
     with np.load(DATA / "scenes" / "chapel.npz") as stored:
         return _storable(lens(stored["radiance"].astype(np.float64) * CHAPEL_SCALE))
@@ -33,6 +43,10 @@ def cloister_scene() -> tuple[np.ndarray, ...]:
 
     Rounded like the chapel. Before the first step and after the last there is always somebody in the picture; where
     nobody ever is, all five are the same to the last bit.
+
+    >>> first, *_, last = cloister_scene()
+    >>> bool(0 < np.mean(first != last) < 0.5)  # something moves, most does not
+    True
     """
     with np.load(DATA / "scenes" / "cloister.npz") as stored:
         plate, values = stored["plate"], stored["values"]
@@ -52,6 +66,11 @@ def random_scene(seed: int, shape=(512, 768), stops: float = 18.5) -> np.ndarray
     shape : rows and columns
     stops : from the 0.1th to the 99.9th percentile of its values
     Returns (H, W, 3) float32, relative radiance, RGB; the same seed gives the same scene.
+
+    >>> scene = random_scene(7, shape=(60, 80), stops=12)
+    >>> low, high = np.percentile(scene, [0.1, 99.9])
+    >>> round(float(np.log2(high / low)))
+    12
     """
     (height, width), rng = shape, np.random.default_rng((seed, 815))
     y, x = np.mgrid[:height, :width].astype(np.float32)

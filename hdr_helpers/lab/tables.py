@@ -5,7 +5,15 @@ from hdr_helpers.lab.metrics import crf_rmse, psnr_l, psnr_mu, radiance_error
 
 
 def print_crf_errors(curves: dict, truth) -> None:
-    """Root mean square error of curves, name -> (3, 256), over the values 5..250 in stops, the gauge removed."""
+    """Root mean square error of curves, name -> (3, 256), over the values 5..250 in stops, the gauge removed.
+
+    curves : dictionary of log inverse responses; truth : (3, 256)
+
+    >>> import numpy as np
+    >>> print_crf_errors({"exact": np.zeros((3, 256))}, np.zeros((3, 256)))
+             red  green   blue
+    exact  0.000  0.000  0.000
+    """
     width = max(map(len, curves))
     print(" " * width + "    red  green   blue")
     for name, curve in curves.items():
@@ -13,7 +21,16 @@ def print_crf_errors(curves: dict, truth) -> None:
 
 
 def print_merges(maps: dict, truth) -> None:
-    """How far radiance maps, name -> (H, W, 3), are from the truth: error in stops, PSNR-mu and PSNR-L in dB."""
+    """How far radiance maps, name -> (H, W, 3), are from the truth: error in stops, PSNR-mu and PSNR-L in dB.
+
+    maps : dictionary of radiance maps; truth : (H, W, 3)
+
+    >>> import numpy as np
+    >>> truth = np.ones((2, 3, 3))
+    >>> print_merges({"mine": truth * [[[1], [1], [2]]]}, truth)  # a third of it is a stop too bright
+           median error   95% better than   PSNR-mu   PSNR-L
+    mine     0.000 stops       1.000 stops ... dB   4.8 dB
+    """
     width = max(map(len, maps))
     print(" " * width + "   median error   95% better than   PSNR-mu   PSNR-L")
     for name, radiance in maps.items():
@@ -28,6 +45,13 @@ def print_motions(times, motions: dict, alignment) -> None:
     times : (P,) seconds
     motions : from a name to (P, 2) shifts in pixels, or to (P, 3) shifts and degrees
     alignment : Alignment, whose percentiles, blocks and doubts stand in the last column
+
+    >>> import numpy as np
+    >>> from hdr_helpers.align import unaligned
+    >>> print_motions([0.5, 1], {"mine": [(3, -1), (0, 0)]}, unaligned(np.zeros((2, 4, 6, 3))))
+        time        mine   percentile, blocks that agree
+       0.5 s    (+3, -1)   -
+         1 s    (+0, +0)   the reference
     """
     width = 11 if all(len(rows[0]) == 2 for rows in motions.values()) else 23
     print(f"{'time':>8} " + "".join(f"{name:>{width}}" for name in motions) + "   percentile, blocks that agree")

@@ -29,6 +29,12 @@ def tonemap_durand(radiance, contrast=30.0, detail=1.0, saturation=0.8, gamma=2.
     saturation : 0..2; 0 is grey, 1 keeps colour ratios, which look too strong once luminance is compressed
     gamma : 0.1..10; display gamma; above 1 brightens
     Returns (H, W, 3) float32, not clipped.
+
+    >>> scene = np.ones((20, 40, 3), np.float32)
+    >>> scene[:, :20] = 1e-4  # a dark room beside a window
+    >>> light = tonemap_durand(scene, contrast=30, saturation=1, gamma=1)
+    >>> round(float(light[10, 35, 0] / light[10, 5, 0]))  # of 10,000
+    30
     """
     light = np.maximum(radiance @ LUMINANCE, LEAST)
     log_light = np.log10(light)
@@ -43,7 +49,11 @@ def tonemap_durand(radiance, contrast=30.0, detail=1.0, saturation=0.8, gamma=2.
 def where_lit(values, light) -> np.ndarray:
     """(N,), the values of all pixels but the black ones; where all are black, of all.
 
+    values, light : (H, W) float; a pixel whose light is at most LEAST is black
     Black pixels, a border or where a merge knew nothing, say nothing of the range of the scene.
+
+    >>> where_lit(np.array([[3, 5]]), light=np.array([[0, 1]])).tolist()
+    [5]
     """
     lit = light > LEAST
     return values[lit] if lit.any() else values.ravel()
@@ -54,7 +64,13 @@ def in_colour(radiance, light, shown, saturation, gamma) -> np.ndarray:
 
     radiance : (H, W, 3) float32, linear RGB; light : (H, W), its luminance, above 0
     shown : (H, W), the luminance that the picture is to have, linear
+    saturation, gamma : as for tonemap_durand
     Returns (H, W, 3) float32, not clipped.
+
+    >>> radiance = np.float32([[[0.4, 0.2, 0.2]]])
+    >>> light = radiance @ LUMINANCE
+    >>> (in_colour(radiance, light, 2 * light, saturation=1, gamma=1) / radiance).round(3).tolist()
+    [[[2.0, 2.0, 2.0]]]
     """
     # By logarithms, which OpenCV takes and undoes faster than numpy raises to a power.
     picture = np.maximum(radiance, LEAST**2)
@@ -76,6 +92,13 @@ def fast_bilateral(values, sigma_space: float, sigma_range: float = 0.4) -> np.n
     For a fixed centre value the bilateral filter is a ratio of two Gaussian blurs. It is computed for
     centre values half a sigma_range apart and interpolated to each pixel's own value. Blurs that wide lose
     little when they are made on a smaller picture, and of a very large one blocks of pixels will do.
+    Returns (H, W) float32.
+
+    >>> step = np.float32([[0] * 20 + [2] * 20] * 20)
+    >>> bool(np.abs(fast_bilateral(step, sigma_space=4) - step).max() < 0.01)  # the edge stays
+    True
+    >>> bool(np.abs(cv2.GaussianBlur(step, (0, 0), 4) - step).max() > 0.8)  # and would not
+    True
     """
     height, width = values.shape
     shrink = max(1.0, sigma_space / 4)
@@ -112,7 +135,12 @@ def follow_edges(base, values, radius: int) -> np.ndarray:
     base, values : (H, W) float32; radius : pixels, at least half as wide as an edge
     In each window of 2 radius + 1 pixels the base is replaced by the line a * values + b that is nearest to it: at an
     edge a is 1 and the base takes the edge over; where the values are grain round a smooth base, a is 0 and it stays.
-    K. He, J. Sun and X. Tang, Guided Image Filtering, ECCV 2010.
+    K. He, J. Sun and X. Tang, Guided Image Filtering, ECCV 2010. Returns (H, W) float32.
+
+    >>> soft = np.float32([[0] * 20 + [0.5, 1, 1.5] + [2] * 20] * 20)
+    >>> steep = np.round(soft / 2) * 2
+    >>> bool(np.abs(follow_edges(steep, soft, 4) - soft).max() < np.abs(steep - soft).max() / 2)
+    True
     """
 
     def mean(picture):

@@ -44,6 +44,10 @@ def intensity_mapping(first, second) -> np.ndarray:
     first, second : (256,) counts of the pixel values of the two photographs
     Returns (256,) float64, values 0..255 with fractions. Where first has no pixels it is interpolated; the
     photographs need not be aligned, if they show nearly the same.
+
+    >>> short, long = np.bincount([10, 20, 30], minlength=256), np.bincount([20, 40, 60], minlength=256)
+    >>> intensity_mapping(short, long)[[10, 20, 30]].tolist()  # the darkest third stays the darkest third
+    [20.0, 40.0, 60.0]
     """
     below_first, below_second = (np.cumsum(h) - h / 2 for h in (first, second))
     filled = np.flatnonzero(second)
@@ -60,6 +64,12 @@ def brightness_transfer(joint, black: int = 0) -> tuple[np.ndarray, ...]:
     Returns for the K values that can be trusted: u, (K,) integers; the median of v, (K,) float64, with fractions;
     the variance of that median, (K,) float64, pixel values squared; and the shares of pixels that read each v, (K, 256)
     float64, 0 away from the median.
+
+    >>> joint = np.zeros((256, 256))
+    >>> joint[[100, 200], [50, 100]] = 1000  # a linear camera, and a second exposure twice as long
+    >>> u, v, variance, seen = brightness_transfer(joint)
+    >>> (u / v).tolist()
+    [2.0, 2.0]
     """
     joint = np.asarray(joint, dtype=np.float64)
     count = joint.sum(axis=1)
@@ -97,6 +107,12 @@ def response_from_transfers(
     Returns g, (256,) float64 with g[128] = 0, and its standard error, (256,) float64, 0 at 128: of the difference
     g(z) - g(128), from the inverse of the same normal equations.
     Raises TooLittleEvidence where the pairs say too little.
+
+    >>> light = np.geomspace(1, 255, 100_000)  # of a linear camera's pixels, and half of it
+    >>> joint = np.histogram2d(light // 1, light // 2, bins=256, range=[(0, 256), (0, 256)])[0]
+    >>> g, errors = response_from_transfers([joint], [np.log(2)], photographs=2)
+    >>> round(float(g[128] - g[64]) / np.log(2).item(), 1)  # stops
+    1.0
     """
     transfers = [brightness_transfer(joint, black) for joint in joints]
     if not transfers:
@@ -133,6 +149,10 @@ def standard_errors(scale, factor, variance: float) -> np.ndarray:
 
     scale, factor : (256,), and the Cholesky factor of the normal matrix scaled by it on both sides
     variance : of an equation whose precision in the matrix is 1
+
+    >>> apart = scipy.linalg.cho_factor(np.eye(256))  # each g(z) measured by itself: variances add up
+    >>> (standard_errors(np.ones(256), apart, 1.0)[[127, 128]] ** 2).round(6).tolist()
+    [2.0, 0.0]
     """
     covariance = scale[:, None] * scipy.linalg.cho_solve(factor, np.diag(scale)) * variance
     of_differences = covariance.diagonal() - 2 * covariance[MIDDLE] + covariance[MIDDLE, MIDDLE]

@@ -38,6 +38,13 @@ def register_locally(images, reference: int, valid=None) -> tuple[tuple, tuple]:
     reference it stays as it is, to the last bit; where flow is confirmed it is warped; elsewhere it is masked. The
     reference is neither changed nor masked.
     Raises ValueError where shapes or the reference don't fit.
+
+    >>> short = np.arange(20, 110, dtype=np.uint8).repeat(3).reshape(1, 90, 3).repeat(60, axis=0)
+    >>> long = 2 * short
+    >>> short[20:40, 20:40] = 100  # a ball flies by, and the reference does not know it
+    >>> images, masks = register_locally([short, long], reference=1)
+    >>> bool(masks[0][30, 30]), bool(masks[0][10, 70]), bool(masks[1].all())
+    (False, True, True)
     """
     images = list(images)
     forms = {(image.shape, image.dtype) for image in images}

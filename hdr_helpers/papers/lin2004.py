@@ -50,6 +50,13 @@ def response_from_edges(image) -> np.ndarray:
     image : (H, W, 3) uint8, RGB
     Returns crf, (3, 256) float64, natural logarithms, crf[:, 128] = 0, strictly rising.
     Raises ValueError where image is something else, and where it has too few edges between different hues.
+
+    >>> light = np.float64([[(0.6, 0.1, 0.1), (0.1, 0.5, 0.2)], [(0.1, 0.2, 0.6), (0.6, 0.5, 0.1)]])
+    >>> light = cv2.GaussianBlur(light.repeat(30, axis=0).repeat(30, axis=1), (0, 0), 1)  # four soft fields
+    >>> crf = response_from_edges(np.uint8(255 * light ** (1 / 2)))
+    >>> stops = (crf[:, 128] - crf[:, 64]) / np.log(2)  # a root: twice the value is four times the light
+    >>> bool(np.all(np.abs(stops - 2) < 0.5))
+    True
     """
     triples, _ = edge_triples(image)
     if len(triples) < FEWEST:
@@ -80,6 +87,11 @@ def edge_triples(image) -> tuple[np.ndarray, np.ndarray]:
     Returns triples, (n, 3, 3) float64: the colour on one side, of the mixed pixel, and on the other side; and the row
     and column of each mixed pixel, (n, 2) integers.
     Raises ValueError where image is something else.
+
+    >>> fields = np.uint8([[(200, 50, 50)] * 10 + [(120, 120, 60)] + [(50, 180, 70)] * 10] * 10)
+    >>> triples, places = edge_triples(fields)
+    >>> triples[0].tolist(), np.unique(places[:, 1]).tolist()
+    ([[200.0, 50.0, 50.0], [120.0, 120.0, 60.0], [50.0, 180.0, 70.0]], [10])
     """
     image = np.asarray(image)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
@@ -102,6 +114,11 @@ def off_the_line(triples, light) -> np.ndarray:
 
     A distance in light, as the paper has it, is small wherever the response is steep, whatever the noise. Divided by
     the slope of the inverse response it is counted in grey levels, as noise is.
+
+    >>> triples = np.float64([[(60, 100, 80), (80, 80, 80), (100, 60, 80)]])  # half of each
+    >>> linear = np.tile(np.arange(256), (3, 1))
+    >>> np.abs(off_the_line(triples, linear)).max().item(), np.abs(off_the_line(triples, linear**2)).max().item() > 1
+    (0.0, True)
     """
     values = np.arange(LEVELS)
     E = np.stack([np.interp(triples[..., c], values, light[c]) for c in range(3)], axis=-1)
@@ -115,6 +132,10 @@ def inverse_responses(numbers) -> np.ndarray:
     """Light of each pixel value, (3, 256) float64, 0 at 0 and 1 at 255, for three members of the family.
 
     numbers : (3, 4) float, as in TYPICAL, one row a channel
+
+    >>> light = inverse_responses(np.array([(1, 0, 0, 0), (2, 0, 0, 0), TYPICAL]))  # the powers 1 and 2
+    >>> light[:2, 128].round(2).tolist()
+    [0.5, 0.25]
     """
     M = (np.arange(LEVELS - 1) + 0.5) / (LEVELS - 1)
     basis = np.stack([np.log(M), *np.polynomial.legendre.legvander(2 * M - 1, 3).T[1:]])

@@ -22,6 +22,10 @@ def quality_maps(image, middle=MIDDLE, spread=SPREAD) -> tuple[np.ndarray, np.nd
     middle, spread : a channel's best value, and how far from it is still good, both in 0..1
     Returns three arrays (H, W) float32: the size of the Laplacian of the grey picture; the standard deviation of
     the three channels; and the product of the three channels' Gaussians round the middle, 0..1.
+
+    >>> contrast, saturation, exposedness = quality_maps(np.full((4, 4, 3), 0.5, np.float32))  # a grey wall
+    >>> contrast.max().round(3).item(), saturation.max().round(3).item(), exposedness.min().round(3).item()
+    (0.0, 0.0, 1.0)
     """
     image = _unit(image)
     contrast = np.abs(cv2.Laplacian(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), cv2.CV_32F))
@@ -35,7 +39,11 @@ def quality_maps(image, middle=MIDDLE, spread=SPREAD) -> tuple[np.ndarray, np.nd
 def fusion_weights(images, contrast=1.0, saturation=1.0, exposedness=1.0, valid=None) -> np.ndarray:
     """How much each photograph counts at each pixel (section 3.2): (P, H, W) float32, the P of a pixel add up to 1.
 
-    Arguments as for exposure_fusion. Where no photograph is valid all count alike.
+    Arguments and errors as for exposure_fusion. Where no photograph is valid all count alike.
+
+    >>> dark, middle, white = (np.full((4, 4, 3), value, np.uint8) for value in (10, 128, 250))
+    >>> fusion_weights([dark, middle, white], contrast=0, saturation=0)[:, 0, 0].argmax().item()
+    1
     """
     images, valid = _checked(images, valid)
     weights = np.empty((len(images), *images[0].shape[:2]), dtype=np.float32)
@@ -64,6 +72,10 @@ def exposure_fusion(images, contrast=1.0, saturation=1.0, exposedness=1.0, valid
     Raises ValueError where shapes or types don't fit.
 
     With valid=None this is OpenCV's result, apart from rounding and from what OpenCV leaves below 0 and above 1.
+
+    >>> photograph = np.arange(192, dtype=np.uint8).reshape(8, 8, 3)
+    >>> np.abs(exposure_fusion([photograph, photograph]) * 255 - photograph).max().round(2).item()  # nothing to choose
+    0.0
     """
     images, valid = _checked(images, valid)
     weights = fusion_weights(images, contrast, saturation, exposedness, valid)
@@ -80,7 +92,13 @@ def exposure_fusion(images, contrast=1.0, saturation=1.0, exposedness=1.0, valid
 
 
 def gaussian_pyramid(image, levels) -> list[np.ndarray]:
-    """An image and levels smaller ones, each blurred and half as wide as the one before."""
+    """An image and levels smaller ones, each blurred and half as wide as the one before.
+
+    image : (H, W) or (H, W, C) float32; levels : how many. Returns levels + 1 arrays of float32.
+
+    >>> [small.shape for small in gaussian_pyramid(np.zeros((9, 16), np.float32), 2)]
+    [(9, 16), (5, 8), (3, 4)]
+    """
     pyramid = [image]
     for _ in range(levels):
         pyramid.append(cv2.pyrDown(pyramid[-1]))
@@ -88,7 +106,14 @@ def gaussian_pyramid(image, levels) -> list[np.ndarray]:
 
 
 def laplacian_pyramid(image, levels) -> list[np.ndarray]:
-    """What each level of a Gaussian pyramid shows beyond the next coarser one; and the coarsest as it is."""
+    """What each level of a Gaussian pyramid shows beyond the next coarser one; and the coarsest as it is.
+
+    image, levels : as for gaussian_pyramid. Returns levels + 1 arrays of float32.
+
+    >>> fine, coarse = laplacian_pyramid(np.full((8, 8), 0.5, np.float32), 1)  # an even wall has no detail
+    >>> fine.max().round(3).item(), coarse.max().round(3).item()
+    (0.0, 0.5)
+    """
     pyramid = gaussian_pyramid(image, levels)
     details = [fine - _twice(coarse, fine.shape) for fine, coarse in pairwise(pyramid)]
     return [*details, pyramid[-1]]

@@ -45,6 +45,11 @@ def radiometric_self_calibration(Z, times, w=None, order=None) -> tuple[np.ndarr
     times, (P,) float64, of which only the ratios mean anything: most stay as they are where one was wrong. Two
     photographs leave nothing to refine.
     Raises ValueError where shapes or values don't fit, and where neighbours share no usable pixel.
+
+    >>> Z = np.array([(z, 2 * z, 4 * z, 8 * z) for z in range(5, 32)])  # a linear camera
+    >>> g, times = radiometric_self_calibration(Z, [1, 2, 5, 8], order=1)  # one time is wrong
+    >>> times.round(2).tolist()
+    [1.0, 2.0, 4.0, 8.0]
     """
     Z, log_times, used, orders = _checked(Z, times, w, order)
     counts = _pairs(Z, used)

@@ -27,6 +27,10 @@ def tonemap_reinhard_global(radiance, key=0.18, white=None, saturation=0.8, gamm
     gamma : 0.1..10; display gamma; above 1 brightens
     Returns (H, W, 3) float32 in 0..1.
     Raises ValueError where the radiance map has another form, or key, white or gamma is not positive.
+
+    >>> radiance = np.geomspace(0.01, 10, 12).reshape(2, 2, 3)
+    >>> np.allclose(tonemap_reinhard_global(radiance), tonemap_reinhard_global(7 * radiance), atol=1e-4)  # no scale
+    True
     """
     radiance = np.asarray(radiance, dtype=np.float32)
     if radiance.ndim != 3 or radiance.shape[2] != 3:
@@ -48,8 +52,11 @@ def tonemap_reinhard_global(radiance, key=0.18, white=None, saturation=0.8, gamm
 def log_average(light) -> float:
     """The scene's log-average luminance (equation 1): the exponential of the mean of logarithms.
 
-    light : luminance, all above 0. The paper's equation divides by the number of pixels in the wrong place; the text
-    makes clear what is meant.
+    light : luminance, any shape, all above 0. The paper's equation divides by the number of pixels in the wrong place;
+    the text makes clear what is meant.
+
+    >>> round(log_average([1, 100]), 6)  # half way in stops
+    10.0
     """
     return float(np.exp(np.mean(np.log(light), dtype=np.float64)))
 
@@ -57,7 +64,12 @@ def log_average(light) -> float:
 def compress(light, white=np.inf) -> np.ndarray:
     """The curve: L / (1 + L) without white (equation 3), else the one that is 1 at white (equation 4).
 
-    light : luminance of which the average has been brought to the key (equation 2)
+    light : luminance, any shape, of which the average has been brought to the key (equation 2)
+    white : luminance that becomes 1; infinity for none
+    Returns float32 of the same shape.
+
+    >>> compress([1, 3]).tolist(), compress([4], white=4).tolist()  # 1 / 2, 3 / 4; and white is white
+    ([0.5, 0.75], [1.0])
     """
     light = np.asarray(light, dtype=np.float32)
     return light * (1 + light * np.float32(1 / white**2)) / (1 + light)

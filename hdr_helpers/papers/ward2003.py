@@ -27,8 +27,13 @@ def bitmaps(gray, percentile: float = 50, valid=None) -> tuple[np.ndarray, np.nd
     """Threshold bitmap and exclusion bitmap of one grey picture (figures 2 and 3).
 
     gray : (H, W) uint8; valid : (H, W) uint8, 0 where a pixel does not count, or None
+    percentile : 0 to 100, of the pixels that count; 50 is the median
     Returns two (H, W) uint8 arrays of 0 and 255: where the picture is brighter than the percentile, and where it
     lies more than TOLERANCE grey levels from it, so that noise can't flip it.
+
+    >>> bright, clear = bitmaps(np.uint8([[10, 52, 50, 49, 90]]))
+    >>> bright.tolist(), clear.tolist()
+    ([[0, 255, 0, 0, 255]], [[255, 0, 0, 0, 255]])
     """
     threshold = _threshold(cv2.calcHist([gray], [0], valid, [256], [0, 256]).ravel(), percentile)
     _, bright = cv2.threshold(gray, threshold, 255, cv2.THRESH_BINARY)
@@ -39,7 +44,12 @@ def bitmaps(gray, percentile: float = 50, valid=None) -> tuple[np.ndarray, np.nd
 def clear_share(histograms, percentile: float) -> float:
     """How well a percentile splits two pictures, each into clearly dark and clearly bright pixels, 0 to 0.5.
 
-    histograms : two (256,) counts. Returns the smallest of the four shares; 0 where a bitmap would be all one value.
+    histograms : two (256,) counts; percentile : 0 to 100, at which both are split
+    Returns the smallest of the four shares; 0 where a bitmap would be all one value.
+
+    >>> ramp, black = np.ones(256), np.bincount([0], minlength=256)
+    >>> round(clear_share([ramp, ramp], 50), 1), clear_share([ramp, black], 50)
+    (0.5, 0.0)
     """
     shares = []
     for histogram in histograms:
@@ -53,7 +63,13 @@ def likely_shifts(fixed, moving, percentile: float, max_shift: int) -> list[tupl
     """Shifts (dx, dy) of moving, in pixels right and down, at which the bitmaps of two pictures agree; likeliest first.
 
     fixed, moving : (gray, valid) each, (H, W) uint8; valid is 255 where a pixel counts, else 0
+    percentile : 0 to 100, at which both are thresholded; 50 is the median
     max_shift : pixels each way
+
+    >>> wall = np.random.default_rng(0).integers(0, 256, (60, 80), np.uint8)
+    >>> everywhere = np.full((58, 75), 255, np.uint8)
+    >>> likely_shifts((wall[:-2, :-5], everywhere), (wall[2:, 5:], everywhere), 50, max_shift=8)[0]
+    (5, 2)
     """
     levels = [[fixed, moving]]
     while min(levels[-1][0][0].shape) >= 2 * SMALLEST:
@@ -71,6 +87,11 @@ def one_level_finer(fixed, moving, shift) -> tuple[int, int]:
     """Of twice a shift (dx, dy) and its eight neighbours, the one at which two bitmaps disagree least.
 
     fixed, moving : (bright, clear) as bitmaps returns them, twice as large as where shift was found
+    shift : (dx, dy) whole pixels of the coarser level
+
+    >>> wall = np.random.default_rng(0).integers(0, 256, (60, 80), np.uint8)
+    >>> one_level_finer(bitmaps(wall[:-2, :-5]), bitmaps(wall[2:, 5:]), shift=(2, 1))
+    (5, 2)
     """
     x, y = 2 * shift[0], 2 * shift[1]
     near = [(x + i, y + j) for j in (0, -1, 1) for i in (0, -1, 1)]  # of equals, the first
@@ -81,6 +102,11 @@ def disagreement(fixed, moving, shift) -> float:
     """How far two bitmaps differ when the second is moved by (dx, dy): 0 not at all, 1 as much as chance would.
 
     fixed, moving : (bright, clear) as bitmaps returns them. Compared by XOR where neither excludes a pixel.
+    shift : (dx, dy) whole pixels right and down
+
+    >>> picture = bitmaps(np.uint8([[10, 90, 10, 10, 90, 90]]))
+    >>> disagreement(picture, picture, shift=(0, 0)), disagreement(picture, picture, shift=(6, 0))
+    (0.0, 1.0)
     """
     (height, width), (dx, dy) = fixed[0].shape, shift
     if abs(dx) >= width or abs(dy) >= height:
@@ -97,7 +123,11 @@ def disagreement(fixed, moving, shift) -> float:
 def halved(gray, valid) -> tuple[np.ndarray, np.ndarray]:
     """The next level of a pyramid: a picture (H, W) uint8 and its mask of 0 and 255, half as large.
 
-    A pixel is valid where all four are that it was made of.
+    gray, valid : (H, W) uint8. A pixel is valid where all four are that it was made of.
+
+    >>> small, whole = halved(np.uint8([[10, 20, 5, 5], [30, 40, 5, 5]]), np.uint8([[255] * 4, [255, 0, 255, 255]]))
+    >>> small.tolist(), whole.tolist()
+    ([[25, 5]], [[0, 255]])
     """
     size = max(gray.shape[1] // 2, 1), max(gray.shape[0] // 2, 1)
     small, whole = (cv2.resize(a, size, interpolation=cv2.INTER_AREA) for a in (gray, valid))
@@ -107,7 +137,13 @@ def halved(gray, valid) -> tuple[np.ndarray, np.ndarray]:
 def overlap(shape, shift) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """Where two arrays of one shape lie on each other when the second is moved by (dx, dy) whole pixels.
 
+    shape : (H, W), of both; shift : (dx, dy), not larger than they are
     Returns the rows and columns of the first, and those of the second.
+
+    >>> here, there = overlap((1, 5), shift=(2, 0))
+    >>> row = np.array([[0, 1, 2, 3, 4]])
+    >>> row[here].tolist(), row[there].tolist()
+    ([[2, 3, 4]], [[0, 1, 2]])
     """
     (height, width), (dx, dy) = shape, shift
     here = np.s_[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]

@@ -34,6 +34,9 @@ def check(number: str, function, *, seed: int = 0, limit: float = LIMIT) -> Resu
     Where the environment names an examiner, as grading does, that chooses the data and the limit.
     Raises ValueError for a number that is not a TODO's, and CheckFailed under HDR_CHECKS_MUST_PASS=1 where points
     are missing. What the function does never raises.
+
+    >>> check("3.1", lambda: 5).passed  # a number is no array of weights
+    False
     """
     examiner = os.environ.get(EXAMINER)
     todo = _todo(number)
@@ -44,14 +47,26 @@ def check(number: str, function, *, seed: int = 0, limit: float = LIMIT) -> Resu
 
 
 def hint(number: str) -> Hint:
-    """The next hint for a TODO; after the last one, the last one again. Raises ValueError for an unknown number."""
+    """The next hint for a TODO; after the last one, the last one again. Raises ValueError for an unknown number.
+
+    number : of the TODO, such as "3.3"
+
+    >>> hint("3.1")
+    Hint 1 of ...
+    """
     rungs = _todo(number).hints
     _asked[number] = min(_asked.get(number, 0) + 1, len(rungs))
     return Hint(number, _asked[number], len(rungs), rungs[_asked[number] - 1])
 
 
 def most_points(number: str) -> float:
-    """What a TODO is worth."""
+    """What a TODO is worth, in points. Raises ValueError for an unknown number.
+
+    number : of the TODO, such as "3.3"
+
+    >>> most_points("3.3") > most_points("3.1")  # the matrix is worth more than the hat
+    True
+    """
     return float(sum(points for points, _, _ in _todo(number).parts))
 
 
