@@ -33,6 +33,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_release(commands)
     _add_grade(commands)
     _add_stage(commands)
+    _add_pages(commands)
     return parser
 
 
@@ -116,6 +117,30 @@ def _add_stage(commands) -> None:
 def _stage(options) -> None:
     for name in stage(source_notebooks()):
         print(f"{BUILD}/source/{name}/{name}.ipynb")
+
+
+def _add_pages(commands) -> None:
+    command = commands.add_parser(
+        "pages",
+        help="make the course's web pages, without solutions",
+        description="Write the README and the notebooks with their outputs, but without solutions, as static web pages "
+        "that need no network. Needs the extra 'pages'.",
+    )
+    command.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        default=ROOT / BUILD / "pages",
+        metavar="DIR",
+        help=f"folder to write to (default: {BUILD}/pages)",
+    )
+    command.set_defaults(run=_pages)
+
+
+def _pages(options) -> None:
+    from hdr_helpers.grading.web import write_pages
+
+    print(f"The first page is {write_pages(options.out)[0]}")
 
 
 if __name__ == "__main__":
