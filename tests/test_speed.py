@@ -1,0 +1,65 @@
+"""The benchmarks in a quick form: beside OpenCV in the same run, with a wide margin, so that a slip of speed is seen.
+
+tests/benchmarks/ measure the same at the size that the README speaks of; the shares in brackets are from there.
+"""
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hdr_helpers import align_mtb, merge_debevec, recover_crf
+from hdr_helpers.lab.camera import Camera
+from hdr_helpers.lab.scenes import random_scene
+
+sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
+from measure import enlarged, in_turns
+
+TIMES = 2.0 ** np.arange(-7, 2)
+SHAPE = (1000, 1500)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    return Camera(jpeg_quality=None)
+
+
+@pytest.fixture(scope="module")
+def bracket(camera):
+    """Nine photographs of 1.5 megapixels."""
+    return enlarged(camera.shoot(random_scene(1), TIMES), SHAPE)
+
+
+def share_of_opencv(ours, theirs):
+    seconds = in_turns(3, ours=ours, theirs=theirs)
+    return seconds["ours"] / seconds["theirs"]
+
+
+def test_a_merge_takes_less_time_than_mergedebevec(bracket, camera):
+    crf = camera.crf()
+    response = np.exp(crf).T[:, None].astype(np.float32).copy()
+    times, images = bracket.times.astype(np.float32), list(bracket.images)
+    share = share_of_opencv(
+        lambda: merge_debevec(images, bracket.times, crf),
+        lambda: cv2.createMergeDebevec().process(images, times, response),
+    )
+    assert share < 1  # (0.1 at 12 megapixels)
+
+
+def test_an_alignment_takes_no_more_than_a_few_times_that_of_alignmtb(bracket):
+    images = list(bracket.images)
+    share = share_of_opencv(
+        lambda: align_mtb(images), lambda: cv2.createAlignMTB().process(images, [image.copy() for image in images])
+    )
+    assert share < 3  # (0.1 at 12 megapixels)
+
+
+def test_a_response_from_all_pixels_takes_little_longer_than_a_merge_by_opencv(bracket, camera):
+    response = np.exp(camera.crf()).T[:, None].astype(np.float32).copy()
+    times, images = bracket.times.astype(np.float32), list(bracket.images)
+    share = share_of_opencv(
+        lambda: recover_crf(bracket), lambda: cv2.createMergeDebevec().process(images, times, response)
+    )
+    assert share < 1.5  # (0.06 at 12 megapixels)
