@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import scipy.linalg
+from scipy.sparse import diags_array
 
 from hdr_helpers._response import LEVELS, MIDDLE
 from hdr_helpers._response.clipping import CLIPPED, RINGING, black_level, whole_white
@@ -118,8 +119,9 @@ def _solve_reduced(Z, B, lam, w):
         )
 
     # Smoothness, equation 4: lam w(z) (g(z-1) - 2 g(z) + g(z+1)) for z = 1 .. 254, every one of them.
-    smooth = lam * np.maximum(w, FLOOR * w.max())[1:-1, None] * np.diff(np.eye(LEVELS), n=2, axis=0)
-    normal = np.diag(edges.sum(axis=1)) - edges + smooth.T @ smooth
+    second = diags_array((1.0, -2.0, 1.0), offsets=(0, 1, 2), shape=(LEVELS - 2, LEVELS))
+    smooth = diags_array(lam * np.maximum(w, FLOOR * w.max())[1:-1]) @ second
+    normal = np.diag(edges.sum(axis=1)) - edges + (smooth.T @ smooth).toarray()
     normal[MIDDLE, MIDDLE] += normal.diagonal().max()  # the gauge row; its size does not change the answer
 
     scale = 1 / np.sqrt(normal.diagonal())

@@ -16,21 +16,25 @@ from hdr_helpers.lab.figures.crf import (
     crf_error_figure,
     crf_figure,
     data_on_curve_figure,
+    data_on_curve_frame,
     doubling_figure,
     edges_figure,
     joint_figure,
     matrix_figure,
     sampling_figure,
 )
+from hdr_helpers.lab.figures.live import Live
 from hdr_helpers.lab.figures.load import (
     clipping_overlay,
     clipping_strip_figure,
     histogram_figure,
+    histogram_frame,
     iso_figure,
     one_photo_figure,
     pixel_figure,
     strip_figure,
     transfer_figure,
+    unusable,
     usable_share,
 )
 from hdr_helpers.lab.figures.merge import (
@@ -51,8 +55,10 @@ from hdr_helpers.lab.figures.tonemap import (
     pyramid_figure,
     quality_maps_figure,
 )
+from hdr_helpers.lab.figures.way import way_figure
 
 __all__ = [
+    "Live",
     "bitmaps_figure",
     "clipping_overlay",
     "clipping_strip_figure",
@@ -61,6 +67,7 @@ __all__ = [
     "crf_figure",
     "curve_figure",
     "data_on_curve_figure",
+    "data_on_curve_frame",
     "detail_figure",
     "doubling_figure",
     "edges_figure",
@@ -71,6 +78,7 @@ __all__ = [
     "hand_figure",
     "held_out_figure",
     "histogram_figure",
+    "histogram_frame",
     "honest_figure",
     "iso_figure",
     "joint_figure",
@@ -91,8 +99,10 @@ __all__ = [
     "show",
     "strip_figure",
     "transfer_figure",
+    "unusable",
     "usable_share",
     "viewed_at",
     "vote_figure",
+    "way_figure",
     "weights_figure",
 ]

@@ -80,22 +80,42 @@ def data_on_curve_figure(Z, B, g, log_E, title="Measured points fall onto one cu
 
     Z : (N, P), B : (P,), g : (256,), log_E : (N,)
     """
+    fig, fill = data_on_curve_frame((B.min(), B.max()), (g.min(), g.max()))
+    fill(Z, B, g, log_E, title)
+    return fig
+
+
+def data_on_curve_frame(log_times, curve):
+    """The same without data: a Figure, and what fills it, to be called with the arguments of data_on_curve_figure.
+
+    log_times, curve : least and greatest of B and of g that is to be seen
+    """
     fig, (left, right) = new_figure(1, 2, 3.6, sharex=True)
-    known = np.flatnonzero(np.isfinite(log_E))
-    few = known[np.argsort(Z[known].sum(axis=1))][:: max(1, len(known) // 12)]
-    for i, (colour, _, marker) in zip(few, THREE * len(few), strict=False):
-        left.plot(Z[i], B, marker + "-", ms=4, lw=0.8, color=colour)
-    right.plot(Z[known].ravel(), (log_E[known, None] + B).ravel(), ".", ms=2, color=MUTED, label="samples")
-    right.plot(np.arange(256), g, color=THREE[0][0], lw=2, label="g")
-    left.set(xlabel="pixel value Z", ylabel="ln dt")
-    right.set(xlabel="pixel value Z", ylabel="ln E + ln dt", ylim=(g.min() - 0.7, g.max() + 0.7))
+    apart = [left.plot([], [], marker + "-", ms=4, lw=0.8, color=colour)[0] for colour, _, marker in THREE]
+    (together,) = right.plot([], [], ".", ms=2, color=MUTED, label="samples")
+    (line,) = right.plot([], [], color=THREE[0][0], lw=2, label="g")
+    margin = 0.05 * (log_times[1] - log_times[0])
+    left.set(xlabel="pixel value Z", ylabel="ln dt", ylim=(log_times[0] - margin, log_times[1] + margin))
+    right.set(xlabel="pixel value Z", ylabel="ln E + ln dt", ylim=(curve[0] - 0.7, curve[1] + 0.7), xlim=(-13, 268))
     left.set_title("each sample its own curve: E is unknown", fontsize=10)
     right.set_title("shifted by its ln E: one curve", fontsize=10)
-    right.legend(frameon=False)
+    legend, message = right.legend(frameon=False, loc="lower right"), headline(fig, "")
     plain(left)
     plain(right)
-    headline(fig, title)
-    return fig
+
+    def fill(Z, B, g, log_E, title):
+        known = np.flatnonzero(np.isfinite(log_E))
+        few = known[np.argsort(Z[known].sum(axis=1))][:: max(1, len(known) // 12)]
+        gap = [np.nan]  # between the samples that are drawn as one broken line
+        for k, samples in enumerate(apart):
+            mine = Z[few[k :: len(apart)]]
+            samples.set_data([x for values in mine for x in (*values, *gap)], [*B, *gap] * len(mine))
+        together.set_data(Z[known].ravel(), (log_E[known, None] + B).ravel())
+        line.set_data(np.arange(256), g)
+        message.set_text(title)
+        return [*apart, together, line, *left.spines.values(), *right.spines.values(), legend, message]
+
+    return fig, fill
 
 
 def crf_figure(crf, title="Response curve of the camera"):

@@ -42,9 +42,9 @@ def strip_figure(bracket, title=None, cols=5):
 
 def clipping_overlay(image):
     """A photograph, (H, W, 3) uint8, with rising stripes where it is too bright, falling where too dark."""
-    rows, cols = np.indices(image.shape[:2])
+    rows, cols = np.ogrid[: image.shape[0], : image.shape[1]]
     marked = image.copy()
-    bright, dark = (image >= TOO_BRIGHT).any(axis=2), (image < TOO_DARK).any(axis=2)
+    dark, bright = unusable(image)
     marked[bright & ((rows + cols) % 8 < 4)] = (230, 159, 0)
     marked[dark & ((rows - cols) % 8 < 4)] = (0, 114, 178)
     return marked
@@ -58,21 +58,43 @@ def _small(image, width: int):
 
 def histogram_figure(image, time):
     """A photograph, (H, W, 3) uint8, with its unusable pixels striped, beside its histograms."""
+    fig, fill = histogram_frame(image)
+    fill(image, time)
+    return fig
+
+
+def histogram_frame(image):
+    """The same, and what fills it with another photograph of that size: a Figure, and fill(image, time)."""
     fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.4, 1])
     bare(left)
-    left.imshow(clipping_overlay(_small(image, PREVIEW)))
+    shown = left.imshow(_small(image, PREVIEW))
     left.set_title("striped: too dark (blue) or too bright (orange)", fontsize=10)
-    _draw_histogram(right, image)
+    lines = _draw_histogram(right, image)
     right.set(xlabel="pixel value", ylabel="share of pixels (%)")
-    right.legend(frameon=False, loc="upper center")
-    right.set_title(f"{usable_share(image):.0%} of the pixels usable", fontsize=10)
-    headline(fig, f"exposure time {seconds(time)}")
-    return fig
+    legend = right.legend(frameon=False, loc="upper center")
+    usable, message = right.set_title("", fontsize=10), headline(fig, "")
+
+    def fill(image, time):
+        shown.set_data(clipping_overlay(_small(image, PREVIEW)))
+        for line, share in zip(lines, _histogram(image), strict=True):
+            line.set_ydata(share)
+        usable.set_text(f"{usable_share(image):.0%} of the pixels usable")
+        message.set_text(f"exposure time {seconds(time)}")
+        return [shown, *lines, *right.spines.values(), legend, usable, message]
+
+    return fig, fill
 
 
 def usable_share(image) -> float:
     """Share of the pixels of a photograph, (H, W, 3) uint8, that are usable in all three channels."""
-    return float(((image >= TOO_DARK) & (image < TOO_BRIGHT)).all(axis=2).mean())
+    return 1 - float(np.logical_or(*unusable(image)).mean())
+
+
+def unusable(image) -> tuple[np.ndarray, np.ndarray]:
+    """Where a photograph, (H, W, 3) uint8, is too dark, and where too bright, in any channel: two (H, W) bool."""
+    red, green, blue = cv2.split(image)
+    darkest, brightest = cv2.min(cv2.min(red, green), blue), cv2.max(cv2.max(red, green), blue)
+    return darkest < TOO_DARK, brightest >= TOO_BRIGHT
 
 
 def clipping_strip_figure(bracket, which):
@@ -97,14 +119,22 @@ def clipping_strip_figure(bracket, which):
 
 
 def _draw_histogram(ax, image):
-    """Share of pixels at each value, on a logarithmic scale, with the unusable values shaded."""
-    for c, (name, colour, style, _) in enumerate(CHANNELS):
-        count = np.bincount(image[..., c].ravel(), minlength=256)
-        ax.plot(count / count.sum() * 100, color=colour, ls=style, label=name)
+    """Share of pixels at each value, on a logarithmic scale, with the unusable values shaded. Returns the lines."""
+    lines = [
+        ax.plot(share, color=colour, ls=style, label=name)[0]
+        for (name, colour, style, _), share in zip(CHANNELS, _histogram(image), strict=True)
+    ]
     ax.axvspan(0, TOO_DARK, color=DARK_MARK, alpha=0.25)
     ax.axvspan(TOO_BRIGHT, 255, color=BRIGHT_MARK, alpha=0.35)
     ax.set(ylim=(0.01, 100), yscale="log", xlim=(0, 255))
     plain(ax)
+    return lines
+
+
+def _histogram(image) -> list[np.ndarray]:
+    """Share of the pixels at each value, (256,), in per cent, for red, green and blue."""
+    counts = [np.bincount(image[..., c].ravel(), minlength=256) for c in range(3)]
+    return [count / count.sum() * 100 for count in counts]
 
 
 def transfer_figure(bracket, j):

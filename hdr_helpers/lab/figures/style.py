@@ -25,9 +25,9 @@ def new_figure(rows=1, cols=1, height=3.6, **kwargs):
     return fig, fig.subplots(rows, cols, **kwargs)
 
 
-def headline(fig, message: str) -> None:
-    """What the figure says, above it."""
-    fig.suptitle(message, fontsize=12, weight="bold", color=INK)
+def headline(fig, message: str):
+    """What the figure says, above it. Returns the Text."""
+    return fig.suptitle(message, fontsize=12, weight="bold", color=INK)
 
 
 def bare(ax) -> None:
