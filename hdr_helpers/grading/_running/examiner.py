@@ -98,7 +98,8 @@ class Examiner:
                 part.sentence = shortened(part.sentence.encode("utf-8", "replace").decode("utf-8"), SAID)
             if caller.lost:
                 result.own = False
-                self._ended[asked] = result
+                if counts:  # another cell may have asked for another function of this name
+                    self._ended[asked] = result
         if counts:
             self.results[asked] = result
         line.say(told(result), FIRST)
@@ -129,8 +130,11 @@ class Speech:
         with self._within(seconds):
             self._connection.send_bytes(message)
 
-    def hear(self, seconds: float, most: int = LARGEST) -> dict:
-        """The next message. Raises TimeoutError, EOFError, OSError, or WireError where it is no message."""
+    def hear(self, seconds: float, most: int) -> dict:
+        """The next message, of so many bytes at most.
+
+        Raises TimeoutError, EOFError, OSError where there is none or a larger one, WireError where it is no message.
+        """
         with self._within(seconds):
             if not self._connection.poll(seconds):
                 raise TimeoutError
@@ -176,7 +180,7 @@ class Caller:
             raise Stop(f"{todo.name} took more time than the check has.")
         try:
             self.line.say(pack({"args": args, "keywords": keywords, "limit": limit}), limit + GRACE)
-            said = self.line.hear(limit + GRACE)
+            said = self.line.hear(limit + GRACE, LARGEST)
         except TimeoutError:
             self.lost = True
             self.stop()

@@ -12,12 +12,14 @@ from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat.v4 import new_code_cell, new_output
 from nbgrader.preprocessors import Execute
 
-from hdr_helpers.grading._running.examiner import Examiner, unasked
+from hdr_helpers.grading._running.examiner import GRACE, Examiner, unasked
 from hdr_helpers.grading._running.harmless import harmless
 from hdr_helpers.grading._running.kernel import Watch, kernel_manager
 from hdr_helpers.grading._running.sandbox import MB, SCRATCH, Bounds
+from hdr_helpers.lab.checks._running import shortened
 
 RUNS = 4  # of one notebook
+BEGINNING = "get_ipython().ask_exit = lambda: None"  # exit() ends a kernel a moment later, in some other cell
 PRELUDE = "from hdr_helpers.lab.checks import check, hint"
 ENDINGS = {
     "dead": "it ended the kernel",
@@ -62,7 +64,7 @@ class ExecuteSubmission(Execute):
     def preprocess(self, nb, resources=None, km=None):
         """Run all cells, then put what the examiner found into the check cells."""
         task = self.task
-        self.timeout, self.store_widget_state = int(task.bounds.cell), False
+        self.store_widget_state = False
         self.skipped, self.watch, self.deadline = {}, None, time.monotonic() + task.bounds.notebook
         (task.folder / SCRATCH).mkdir(parents=True, exist_ok=True)
         self.examiner = Examiner(
@@ -115,6 +117,7 @@ class ExecuteSubmission(Execute):
 
     def start_new_kernel(self, **keywords):
         super().start_new_kernel(**keywords | {"cwd": str(self.place)})
+        self.fresh = True  # nothing has run in it
         self.watch = Watch(self.km.provisioner.process.pid, self.task.folder, self.task.bounds)
 
     def preprocess_cell(self, cell, resources, index):
@@ -132,25 +135,56 @@ class ExecuteSubmission(Execute):
                 self.task.flags.append(said)
             cell["outputs"] = []
             return cell, resources
-        number = number_of(cell)
+        number, bounds = number_of(cell), self.task.bounds
         self.examiner.expect(number)
+        # The examiner ends a check by itself, and knows why.
+        self.timeout = int(max(bounds.cell, bounds.check + 2 * GRACE) if number else bounds.cell)
+        self.raise_on_iopub_timeout = False  # a cell that ended and whose output comes late is no slow cell
+        if self.fresh:
+            self.fresh = False
+            self._run_our_own(BEGINNING, index)
         if number:  # a student may have used the name for something else
-            self.execute_cell(new_code_cell(PRELUDE), index, store_history=False)
+            self._run_our_own(PRELUDE, index)
         cell, resources = super().preprocess_cell(cell, resources, index)
         if any(output.get("ename") == "CellTimeoutError" for output in cell.get("outputs", ())):
-            self.task.flags.append(f"Cell {index + 1} was interrupted after {self.task.bounds.cell:g} seconds.")
+            self.task.flags.append(f"Cell {index + 1} was interrupted after {self.timeout} seconds.")
+        for output in cell.get("outputs", ()):
+            if output.output_type == "error" and not self._may_show(output):  # nbgrader adds one that was dropped
+                output.ename, output.evalue = shortened(output.ename), shortened(output.evalue)
+                output.traceback = [f"{output.ename}: {output.evalue}"]
         return cell, resources
+
+    def _run_our_own(self, source, index):
+        """Run something before the cell at this index."""
+        cell = self.nb.cells[index]
+        try:
+            self.execute_cell(new_code_cell(source), index, store_history=False)
+        finally:
+            self.nb.cells[index] = cell  # where nbclient has put ours
+
+    async def _async_handle_timeout(self, timeout, cell=None):
+        """Interrupt a cell; from now on, one that does not end can't be interrupted."""
+        self.raise_on_iopub_timeout = True
+        return await super()._async_handle_timeout(timeout, cell)
 
     def output(self, outs, msg, display_id, cell_index):
         """Keep what a cell shows, as far as it may."""
-        content = msg["content"]
-        self.shown += sum(len(str(part)) for part in (*content.get("data", {}).values(), content.get("text", "")))
+        return super().output(outs, msg, display_id, cell_index) if self._may_show(msg["content"]) else None
+
+    def _update_display_id(self, display_id, msg):
+        """Change what was shown before, as far as this cell may show more; nbclient has no other place for this."""
+        if msg["msg_type"] != "update_display_data" or self._may_show(msg["content"]):
+            super()._update_display_id(display_id, msg)
+
+    def _may_show(self, content) -> bool:
+        """Count what the cell that runs now shows."""
+        self.shown += len(str(content))
         if self.shown <= self.task.bounds.output * MB:
-            return super().output(outs, msg, display_id, cell_index)
-        said = f"Cell {cell_index + 1} showed more than {self.task.bounds.output:g} MB; the rest was dropped."
+            return True
+        said = f"Cell {self.at + 1} showed more than {self.task.bounds.output:g} MB; the rest was dropped."
         if said not in self.task.flags:
             self.task.flags.append(said)
-        return None
+        return False
 
     def _show(self, cell, number, nb):
         """The check cell shows the examiner's result, whatever the kernel printed there."""

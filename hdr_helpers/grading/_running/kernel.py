@@ -57,11 +57,8 @@ class Watch:
 
     def _look(self):
         while not self._over.wait(LOOK):
-            family, used = self._family(), 0
-            for process in family:
-                with suppress(psutil.Error):
-                    used += process.memory_info().rss
-            if used > self._bounds.memory * MB:
+            family = self._family()
+            if memory_of(family, self._bounds.memory * MB) > self._bounds.memory * MB:
                 self.kill("memory")
             elif len(family) > self._bounds.processes:
                 self.kill("processes")
@@ -69,6 +66,19 @@ class Watch:
                 most = self._bounds.disk * MB
                 if size_of(self._line, most) + size_of_nameless(family) > most:
                     self.kill("disk")
+
+
+def memory_of(processes, enough: float) -> int:
+    """Bytes of memory that processes use together. What they share is told apart where it seems more than enough."""
+    sizes = {}
+    for process in processes:
+        with suppress(psutil.Error):
+            sizes[process] = process.memory_info().rss
+    if sum(sizes.values()) > enough:
+        for process in sizes:
+            with suppress(psutil.Error):
+                sizes[process] = getattr(process.memory_full_info(), "pss", sizes[process])
+    return sum(sizes.values())
 
 
 def size_of(folder: Path, enough: float = float("inf")) -> float:

@@ -11,6 +11,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from hdr_helpers.grading._running.calls import call_filter
 from hdr_helpers.grading.course import ROOT, InstructorError
 from hdr_helpers.lab.checks import MUST_PASS
 from hdr_helpers.lab.checks._examined import EXAMINER
@@ -18,6 +19,7 @@ from hdr_helpers.lab.checks._examined import EXAMINER
 SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store")
 SETTINGS = ("/etc/ld.so.cache", "/etc/ld.so.conf", "/etc/fonts", "/etc/alternatives", "/etc/localtime")
 COURSE, HOME = "/course", "/home/student"
+FILTER = "9"  # number under which bubblewrap finds the filter of calls opened
 LINE, SCRATCH = "line", "scratch"  # folders of a job that its kernel gets: one to speak in, one to read from
 ISOLATED = ("--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL")
 NO_NESTS = ("--unshare-user", "--disable-userns")  # no namespaces within, in which a student could mount things
@@ -73,7 +75,11 @@ def kernel_command(folder: Path, examiner: str, bounds: Bounds, sandboxed: bool)
     kernel = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
     if sandboxed:
         # An empty environment for bubblewrap too, as that of its own process can be read from within.
-        return _limited(["env", "-i", *_walled(folder, examiner, bounds, kernel)], bounds), {}, folder
+        command = ["env", "-i", *_walled(folder, examiner, bounds, kernel)]
+        if (calls := call_filter()) is not None:
+            (folder / "calls").write_bytes(calls)
+            command = ["/bin/sh", "-c", f'exec "$@" {FILTER}<"$0"', str(folder / "calls"), *command]
+        return _limited(command, bounds), {}, folder
     work = folder / "work" / "notebooks"  # beside it the two folders that notebooks look for at ../
     work.mkdir(parents=True, exist_ok=True)
     for part in ("hdr_helpers", "data"):
@@ -133,4 +139,6 @@ def _walled(folder: Path, examiner: str, bounds: Bounds, kernel: list[str]) -> l
     }
     for name, value in inside.items():
         parts += ["--setenv", name, value]
+    if call_filter() is not None:
+        parts += ["--seccomp", FILTER]
     return [*parts, "--remount-ro", "/", "--chdir", f"{COURSE}/notebooks", *kernel]

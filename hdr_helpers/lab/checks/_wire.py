@@ -45,11 +45,17 @@ def unpack(data: bytes):
 
 
 def _array_of(blob: bytes) -> np.ndarray:
-    """The array of a .npy file. Not by np.load, which also opens archives."""
-    array = np.lib.format.read_array(io.BytesIO(blob), allow_pickle=False)
-    if array.size > len(blob):  # elements of no bytes, as many as one likes
-        raise WireError("an array of nothing")
-    return array
+    """The array of a .npy file. np.load would also open archives, and make room for whatever the header says."""
+    content = io.BytesIO(blob)
+    version = np.lib.format.read_magic(content)
+    header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, by_columns, dtype = header(content)
+    if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(blob) - content.tell():
+        raise WireError("an array that is not what its header says")
+    if not dtype.itemsize:
+        _few(shape)
+    order = "F" if by_columns else "C"
+    return np.ndarray(shape, dtype, blob, content.tell(), order=order).copy(order="K")
 
 
 def _npy(array) -> bytes:
@@ -131,11 +137,18 @@ class _Reader:
     """Makes the values that trees stand for, and no more of them than memory and patience allow."""
 
     def __init__(self, arrays):
-        self.arrays, self.pictures = arrays, 0
+        self.arrays, self.pictures, self.depth = arrays, 0, 0
 
     def built(self, tree):
-        kind, content = tree
-        if kind == "value":
+        self.depth += 1
+        if self.depth > 2 * DEPTH:
+            raise WireError("a nest")
+        value = self._built(*tree)
+        self.depth -= 1
+        return value
+
+    def _built(self, kind, content):
+        if kind == "value" and not isinstance(content, (list, dict)):
             return content
         if kind in ("list", "tuple"):
             return {"list": list, "tuple": tuple}[kind](map(self.built, content))
