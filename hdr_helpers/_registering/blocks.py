@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from hdr_helpers._registering.motion import Motion, fit_motion
 from hdr_helpers.papers.grossberg_nayar2003 import intensity_mapping
@@ -130,7 +130,7 @@ def ask_blocks(fixed: View, moving: View, shift, most: int = FEW) -> Vote:
         # Another block agrees by chance at few of the positions that it was tried at; but we chose among many.
         positions = (2 * REACH + 1) ** 2
         one = (2 * agree + 1) ** 2 / positions
-        chance = min(1.0, len(turns) * positions / 9 * float(binom.sf(near.sum() - 1, asked, one)))
+        chance = min(1.0, len(turns) * positions / 9 * float(bdtrc(near.sum() - 1, asked, one)))
         if chance < best.chance:
             motion, known = _settled(found[near], target[near], unit, fixed)
             best = Vote(motion, int(near.sum()), asked, chance, known, agree * unit, target[near])
