@@ -259,3 +259,12 @@ def test_the_whole_course_with_all_solutions_gets_every_point_and_the_empty_stud
         assert [notebook.name for notebook in student.notebooks] == [path.stem for path in source_notebooks()]
         assert not student.all_flags
         assert {notebook.kind for notebook in student.notebooks} == {"graded"}
+    for path in (tmp_path / "out" / "autograded").rglob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        shown = [output for cell in cells for output in cell.get("outputs", ())]
+        assert not [output for output in shown if output["output_type"] == "error"], path
+        assert not [output for output in shown if output.get("name") == "stderr"], path
+        printed = "".join("".join(output.get("text", ())) for output in shown)
+        # Nothing that the course made is kept as the student's.
+        if path.stem in ("03_crf", "04_merge"):
+            assert ("Kept for the next" if "solved" in path.parts else "Not kept: the course's own") in printed

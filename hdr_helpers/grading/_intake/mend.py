@@ -4,12 +4,16 @@ Students copy, split, move and delete cells, strip metadata and edit checks. nbg
 for the whole class. So what can be told is put right first, and what was found is said.
 """
 
+import json
 import re
 from collections import Counter
+from itertools import pairwise
 
 import nbformat
 
 LARGEST = 100 * 2**20  # bytes of a notebook
+UNUSED = ("outputs", "attachments", "before", "after")  # of a marked cell, where it is put back
+MINOR = 5  # of nbformat 4: from here on every cell has an id
 
 
 class Unreadable(ValueError):
@@ -17,8 +21,13 @@ class Unreadable(ValueError):
 
 
 def marked_cells(released: dict) -> list[dict]:
-    """The cells of a notebook that nbgrader has marked, as mend wants them."""
-    return [cell for cell in released["cells"] if cell["metadata"].get("nbgrader", {}).get("grade_id")]
+    """The cells of a notebook that nbgrader has marked, as mend wants them: each knows its neighbours' texts."""
+    nobody, cells = {"source": ""}, released["cells"]
+    return [
+        cell | {"before": before["source"], "after": after["source"]}
+        for before, cell, after in zip([nobody, *cells], cells, [*cells[1:], nobody], strict=False)
+        if cell["metadata"].get("nbgrader", {}).get("grade_id")
+    ]
 
 
 def mend(data: bytes, marked: list[dict]) -> tuple[nbformat.NotebookNode, list[str]]:
@@ -36,7 +45,8 @@ def mend(data: bytes, marked: list[dict]) -> tuple[nbformat.NotebookNode, list[s
         if not (name and _is_fixed(_form(name, marked))):
             kept.append(cell)
     for form in marked:
-        _settle(form, found.get(form["metadata"]["nbgrader"]["grade_id"], []), kept, flags)
+        name = form["metadata"]["nbgrader"]["grade_id"]
+        _settle(form, found.get(name) or _by_question(form, notebook.cells, marked), kept, flags)
     _order(kept, marked)
     notebook.cells = kept
     return notebook, flags
@@ -48,14 +58,17 @@ def _read(data):
     if len(data) > LARGEST:
         raise Unreadable(f"The file has more than {LARGEST // 2**20} MB.")
     try:
-        text = data.decode("utf-8-sig")
-        notebook = nbformat.reads(text, as_version=4)
-        notebook = nbformat.from_dict(nbformat.validator.normalize(notebook)[1])
+        notebook = nbformat.reads(data.decode("utf-8-sig"), as_version=4)
         for cell in notebook.cells:
             cell.source = "".join(cell.source)
-            cell.metadata = nbformat.from_dict(dict(cell.metadata))
+            if not re.fullmatch(r"[\w-]{1,64}", str(cell.get("id")), re.ASCII):
+                cell.pop("id", None)  # it is given another one
             if cell.cell_type == "code":
                 cell.outputs, cell.execution_count = [], None
+        # JSON can hold half a character, "\\ud800", which could not be written to a file again.
+        notebook = json.loads(json.dumps(notebook, ensure_ascii=False).encode("utf-8", "replace"))
+        notebook["nbformat_minor"] = max(notebook["nbformat_minor"], MINOR)
+        notebook = nbformat.from_dict(nbformat.validator.normalize(notebook, strip_invalid_metadata=True)[1])
     except UnicodeDecodeError:
         raise Unreadable("The file is no text in UTF-8, as a notebook is.") from None
     except Exception as problem:  # nbformat raises whatever a broken structure leads to
@@ -82,23 +95,41 @@ def _is_fixed(form) -> bool:
     return not form["metadata"]["nbgrader"].get("solution")
 
 
+def _mark(cell) -> str:
+    """The grade_id in a cell's mark, empty where there is none or no proper one."""
+    facts = cell.metadata.get("nbgrader")
+    name = facts.get("grade_id") if isinstance(facts, dict) else None
+    return name if isinstance(name, str) else ""
+
+
 def _marked_as(cell, marked) -> str | None:
     """Which marked cell this is: by its mark, by its id, or by the function that it defines or checks."""
     names = {form["metadata"]["nbgrader"]["grade_id"]: form for form in marked}
-    own = cell.metadata.get("nbgrader")
-    own = own.get("grade_id") if isinstance(own, dict) else None
+    own = _mark(cell)
     for name in (own, cell.get("id")):
         if name in names:
             return name
     for name, form in names.items():
         if cell.get("id") == form.get("id"):
             return name
-    if own is None and cell.cell_type == "code":
+        if _is_fixed(form) and cell.source.strip() == form["source"].strip():
+            return name
+    if not own and cell.cell_type == "code":
         for name, form in names.items():
             begin = _beginning(form)
             if begin and re.search(rf"^{re.escape(begin)}", cell.source, re.M):
                 return name
     return None
+
+
+def _by_question(form, cells, marked) -> list:
+    """The text that stands behind a question, where nothing else tells that it is the answer."""
+    asked, handed_out = form["before"].strip(), form["after"].strip()
+    for before, cell in pairwise(cells):
+        if form["cell_type"] == "markdown" and asked and before.source.strip() == asked:
+            others = cell.cell_type != "markdown" or cell.source.strip() == handed_out or _marked_as(cell, marked)
+            return [] if others else [cell]
+    return []
 
 
 def _beginning(form) -> str:
@@ -122,7 +153,7 @@ def _settle(form, cells, kept, flags):
         kept.append(_as_handed_out(form))
     elif cells:
         cell = cells[-1]
-        if not isinstance(cell.metadata.get("nbgrader"), dict) or cell.metadata.nbgrader.get("grade_id") != name:
+        if _mark(cell) != name:
             flags.append(f"The cell {name} had lost its marks; they were put back.")
         if cell.cell_type != form["cell_type"]:
             flags.append(f"The cell {name} had become {cell.cell_type}; it was taken as {form['cell_type']}.")
@@ -139,13 +170,14 @@ def _change_type(cell, kind):
     cell.cell_type = kind
     if kind == "code":
         cell.outputs, cell.execution_count = [], None
+        cell.pop("attachments", None)
     else:
         cell.pop("outputs", None)
         cell.pop("execution_count", None)
 
 
 def _as_handed_out(form):
-    cell = nbformat.from_dict({key: value for key, value in form.items() if key not in ("outputs", "attachments")})
+    cell = nbformat.from_dict({key: value for key, value in form.items() if key not in UNUSED})
     cell.source = "".join(cell.source)
     if cell.cell_type == "code":
         cell.outputs, cell.execution_count = [], None
@@ -165,8 +197,7 @@ def _order(kept, marked):
         kept.insert(max(before) + 1 if before else 0, cell)
     ids = Counter()
     for cell in kept:
-        facts = cell.metadata.get("nbgrader")
-        if not isinstance(facts, dict) or facts.get("grade_id") not in names:
+        if _mark(cell) not in names:
             cell.metadata.pop("nbgrader", None)
         ids[cell.get("id")] += 1
         if ids[cell.get("id")] > 1:
@@ -175,8 +206,4 @@ def _order(kept, marked):
 
 def _places(cells) -> dict:
     """Where each marked cell is: the last one, as only that still has its mark."""
-    return {
-        cell.metadata["nbgrader"]["grade_id"]: k
-        for k, cell in enumerate(cells)
-        if isinstance(cell.metadata.get("nbgrader"), dict) and cell.metadata["nbgrader"].get("grade_id")
-    }
+    return {_mark(cell): k for k, cell in enumerate(cells) if _mark(cell)}
