@@ -1,4 +1,4 @@
-"""Every notebook in a real JupyterLab: it runs to its end, each explorer answers the keyboard, no page reports an error."""
+"""Every notebook in a real JupyterLab: it runs to its end, explorers answer the keyboard, no page reports an error."""
 
 import os
 import shutil
