@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from hdr_helpers.grading import collect as collecting
-from hdr_helpers.grading import unpack
+from hdr_helpers.grading._intake import collect as collecting
+from hdr_helpers.grading._intake import unpack
 from hdr_helpers.grading._intake.collect import collect
 from hdr_helpers.grading.course import InstructorError
 

@@ -178,11 +178,13 @@ def set_to(explorer, **values):
                 control.value = value
 
 
-def test_the_explorer_of_exposures_shows_the_static_figure_of_each(small_bracket):
+def test_the_explorer_of_exposures_shows_each_as_if_it_were_drawn_in_full(small_bracket):
     explorer = make("exposure", small_bracket)
     for image, t in zip(small_bracket.images, small_bracket.times, strict=True):
         set_to(explorer, exposure=t)
-        assert_looks_like(explorer, drawn_in_full(figures.histogram_figure(image, t)))
+        figure, fill = figures.histogram_frame(image)
+        fill(image, t)
+        assert_looks_like(explorer, drawn_in_full(figure))
         assert f"{figures.usable_share(image):.0%} of the pixels usable" in said(explorer)
         assert figures.seconds(t) in said(explorer)
 

@@ -55,6 +55,31 @@ def test_a_room_behind_a_stage_imports_only_its_neighbours_earlier_stages_and_pa
                 )
 
 
+def test_every_room_is_small():
+    modules = [*(ROOT / "hdr_helpers").rglob("*.py")]
+    assert modules
+    assert not [path.name for path in modules if len(path.read_text(encoding="utf-8").splitlines()) > 260]
+
+
+def test_nothing_outside_of_grading_imports_it():
+    for path in (ROOT / "hdr_helpers").rglob("*.py"):
+        if "grading" not in path.relative_to(ROOT).parts:
+            assert not [module for module in imports(path) if module.startswith("hdr_helpers.grading")], path.name
+
+
+def test_every_function_is_called_by_the_course_and_not_by_tests_alone():
+    modules = {path: path.read_text(encoding="utf-8") for path in (ROOT / "hdr_helpers").rglob("*.py")}
+    cells = [cell["source"] for notebook in NOTEBOOKS for cell in code_cells(notebook)]
+    elsewhere = "\n".join([*cells, (ROOT / "README.md").read_text(encoding="utf-8")])
+    for path, text in modules.items():
+        for node in ast.parse(text).body:
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name != "_":
+                word = re.compile(rf"\b{node.name}\b")
+                others = [other for place, other in modules.items() if place.name != "__init__.py" or place == path]
+                used = sum(len(word.findall(other)) for other in (*others, elsewhere))
+                assert used > 1, f"{node.name} in {path.name}"
+
+
 def test_a_paper_imports_no_stage():
     papers = list((ROOT / "hdr_helpers" / "papers").glob("*.py"))
     assert papers

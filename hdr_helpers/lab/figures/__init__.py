@@ -27,7 +27,6 @@ from hdr_helpers.lab.figures.live import Live
 from hdr_helpers.lab.figures.load import (
     clipping_overlay,
     clipping_strip_figure,
-    histogram_figure,
     histogram_frame,
     iso_figure,
     one_photo_figure,
@@ -77,7 +76,6 @@ __all__ = [
     "ghost_map_figure",
     "hand_figure",
     "held_out_figure",
-    "histogram_figure",
     "histogram_frame",
     "honest_figure",
     "iso_figure",

@@ -56,15 +56,12 @@ def _small(image, width: int):
     return cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
 
 
-def histogram_figure(image, time):
-    """A photograph, (H, W, 3) uint8, with its unusable pixels striped, beside its histograms."""
-    fig, fill = histogram_frame(image)
-    fill(image, time)
-    return fig
-
-
 def histogram_frame(image):
-    """The same, and what fills it with another photograph of that size: a Figure, and fill(image, time)."""
+    """A photograph with its unusable pixels striped, beside its histograms.
+
+    image : (H, W, 3) uint8
+    Returns a Figure, and fill(image, time), which puts a photograph of that size into it.
+    """
     fig, (left, right) = new_figure(1, 2, 3.7, width_ratios=[1.4, 1])
     bare(left)
     shown = left.imshow(_small(image, PREVIEW))
