@@ -1,20 +1,19 @@
 """A class of odd submissions of the shorter course: TODOs 3.1, 3.2, 3.4 and, mostly not handed in, 4.3.
 
 Every function below spoils one student's notebooks by what its code does or claims. Its decorator says what is due.
-Cells and files that are odd are in odd_files.
+Odd cells and files, and pasted answers, are in odd_files.
 """
 
-import inspect
 import json
 from typing import NamedTuple
 
 from short_course import Student
 
-from hdr_helpers import crf
 from hdr_helpers.grading.solutions import BEGIN
 
 CLASS = {}
 ALL, NONE = "right right right", "unasked unasked unasked"
+GRADED, STOPPED = ("graded", "missing"), ("stopped", "missing")
 
 
 class Due(NamedTuple):
@@ -32,7 +31,7 @@ class Due(NamedTuple):
     said: dict
 
 
-def due(states, *flags, kinds=("graded", "missing"), **said):
+def due(states, *flags, kinds=GRADED, **said):
     """said : words of checks, such as t31 for that of 3.1"""
 
     def add(spoil):
@@ -124,6 +123,12 @@ def leaves_by_os_exit_in_a_function_and_in_a_cell(student):
     student.insert("todo-3-2", "import os\nos._exit(3)")
 
 
+@due("right unasked unasked", *each("Cell {} was left out, because it", 4, 5, 6, 7), kinds=STOPPED, t32="stopped b")
+def ends_its_kernel_in_one_cell_after_another(student):
+    for _ in range(4):
+        student.insert("todo-3-2", "import os\nos._exit(3)")
+
+
 @due(ALL, "Cell 9 was left out, because it ended the kernel")
 def kills_its_kernel_a_second_later(student):
     student.insert("check-3-4", "import time\ntime.sleep(100)", after=True)
@@ -165,21 +170,7 @@ def changes_numpy_and_prints_in_a_thread_for_ever(student):
     student.insert("todo-3-1", SHOUTS)
 
 
-# Answers that are not the student's, and points that nobody gave
-
-
-@due(ALL, *each("{0} has the structure of {0} in hdr_helpers/crf.py; was it pasted?", "_ties", "_solve_reduced"))
-def pastes_the_helpers(student):
-    used = "from hdr_helpers import crf\nglobals().update({k: v for k, v in vars(crf).items() if k[:2] != '__'})"
-    pasted = [inspect.getsource(function) for function in (crf._chunks, crf._ties, crf._solve_reduced)]
-    student.insert("todo-3-1", "\n".join([used, *pasted]).replace("edges", "links"))
-    student.write("todo-3-4", "    return _solve_reduced(Z, B, lam, w)[:2]")
-
-
-@due("wrong right wrong", t31="calls hat_weights, which is an answer that already exists", t34="calls gsolve, which is")
-def calls_the_helpers(student):
-    student.write("todo-3-1", "    from hdr_helpers import hat_weights\n    return hat_weights()")
-    student.write("todo-3-4", "    import hdr_helpers\n    return hdr_helpers.gsolve(Z, B, lam, w)")
+# Points that nobody gave
 
 
 FULL = """

@@ -1,11 +1,13 @@
-"""Odd submissions of the shorter course, as in odd_class: cells and files that are not as they were handed out."""
+"""Odd submissions, as in odd_class: cells and files that are not as they were, and answers that are not one's own."""
 
 import copy
+import inspect
 import json
 
 import nbformat
 from odd_class import ALL, NONE, as_bytes, begin, due, each
 
+from hdr_helpers import crf
 from hdr_helpers.grading.solutions import BEGIN
 
 
@@ -105,3 +107,20 @@ def is_empty_and_has_a_conflict_in_git(student):
 @due(NONE, "only 'essay.pdf'", "It was not handed in", kinds=("missing", "missing"), t31="It was not handed in")
 def is_an_essay(student):
     return {"essay.pdf": b"%PDF"}
+
+
+# Answers that are not one's own
+
+
+@due(ALL, *each("{0} has the structure of {0} in hdr_helpers/crf.py; was it pasted?", "_ties", "_solve_reduced"))
+def pastes_the_helpers(student):
+    used = "from hdr_helpers import crf\nglobals().update({k: v for k, v in vars(crf).items() if k[:2] != '__'})"
+    pasted = [inspect.getsource(function) for function in (crf._chunks, crf._ties, crf._solve_reduced)]
+    student.insert("todo-3-1", "\n".join([used, *pasted]).replace("edges", "links"))
+    student.write("todo-3-4", "    return _solve_reduced(Z, B, lam, w)[:2]")
+
+
+@due("wrong right wrong", t31="calls hat_weights, which is an answer that already exists", t34="calls gsolve, which is")
+def calls_the_helpers(student):
+    student.write("todo-3-1", "    from hdr_helpers import hat_weights\n    return hat_weights()")
+    student.write("todo-3-4", "    import hdr_helpers\n    return hdr_helpers.gsolve(Z, B, lam, w)")
