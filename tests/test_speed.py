@@ -1,9 +1,10 @@
 """The benchmarks in a quick form: beside OpenCV in the same run, with a wide margin, so that a slip of speed is seen.
 
-tests/benchmarks/ measure the same at the size that the README speaks of; the shares in brackets are from there.
+Seen here: 0.35, 0.85 and 0.27. tests/benchmarks/ measure seconds at the size that the README speaks of.
 """
 
 import sys
+import time
 from pathlib import Path
 
 import cv2
@@ -15,7 +16,7 @@ from hdr_helpers.lab.camera import Camera
 from hdr_helpers.lab.scenes import random_scene
 
 sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
-from measure import enlarged, in_turns
+from measure import enlarged
 
 TIMES = 2.0 ** np.arange(-7, 2)
 SHAPE = (1000, 1500)
@@ -33,11 +34,16 @@ def bracket(camera):
 
 
 def share_of_opencv(ours, theirs):
-    seconds = in_turns(3, ours=ours, theirs=theirs)
-    return seconds["ours"] / seconds["theirs"]
+    """Processor time of ours in that of OpenCV's, the least of three runs: what else the machine does hardly counts."""
+    least = {}
+    for work in 3 * (ours, theirs):
+        began = time.process_time()
+        work()
+        least[work] = min(time.process_time() - began, least.get(work, np.inf))
+    return least[ours] / least[theirs]
 
 
-def test_a_merge_takes_less_time_than_mergedebevec(bracket, camera):
+def test_a_merge_takes_no_more_work_than_mergedebevec(bracket, camera):
     crf = camera.crf()
     response = np.exp(crf).T[:, None].astype(np.float32).copy()
     times, images = bracket.times.astype(np.float32), list(bracket.images)
@@ -45,21 +51,21 @@ def test_a_merge_takes_less_time_than_mergedebevec(bracket, camera):
         lambda: merge_debevec(images, bracket.times, crf),
         lambda: cv2.createMergeDebevec().process(images, times, response),
     )
-    assert share < 1  # (0.1 at 12 megapixels)
+    assert share < 0.8
 
 
-def test_an_alignment_takes_no_more_than_a_few_times_that_of_alignmtb(bracket):
+def test_an_alignment_takes_no_more_than_twice_the_work_of_alignmtb(bracket):
     images = list(bracket.images)
     share = share_of_opencv(
         lambda: align_mtb(images), lambda: cv2.createAlignMTB().process(images, [image.copy() for image in images])
     )
-    assert share < 3  # (0.1 at 12 megapixels)
+    assert share < 2
 
 
-def test_a_response_from_all_pixels_takes_little_longer_than_a_merge_by_opencv(bracket, camera):
+def test_a_response_from_all_pixels_takes_less_work_than_a_merge_by_opencv(bracket, camera):
     response = np.exp(camera.crf()).T[:, None].astype(np.float32).copy()
     times, images = bracket.times.astype(np.float32), list(bracket.images)
     share = share_of_opencv(
         lambda: recover_crf(bracket), lambda: cv2.createMergeDebevec().process(images, times, response)
     )
-    assert share < 1.5  # (0.06 at 12 megapixels)
+    assert share < 0.8
