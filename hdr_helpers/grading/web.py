@@ -109,7 +109,7 @@ def _page(notebook: dict, name: str, titles: dict, folder: Path) -> str:
     ]
     node = nbformat.reads(json.dumps(notebook), as_version=4)  # which puts the lines of outputs together
     node.metadata.update(title=titles[name], course_links=" · ".join(links))
-    exporter = HTMLExporter(config=Config(), embed_images=True, exclude_anchor_links=True)
+    exporter = HTMLExporter(config=Config(), embed_images=True)
     exporter.raw_template = TEMPLATE
     page, _ = exporter.from_notebook_node(node, {"metadata": {"path": str(folder), "name": titles[name]}})
     return with_equations(page, equations)
