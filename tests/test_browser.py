@@ -77,6 +77,18 @@ def is_the_pages(message):
     return message.type == "error" and not message.text.startswith("Failed to load resource")
 
 
+def wait_until_it_has_run(page):
+    """Wait until the kernel has been busy and then at rest for three seconds, as it is not between two cells."""
+    page.wait_for_selector('.jp-NotebookPanel-toolbar [data-status="busy"]', timeout=LONGEST)
+    at_rest = "() => document.querySelector('.jp-NotebookPanel-toolbar [data-status]').dataset.status === 'idle'"
+    waiting = "() => [...document.querySelectorAll('.jp-InputPrompt')].some(prompt => prompt.innerText.includes('*'))"
+    quiet, end = 0, time.monotonic() + LONGEST / 1000
+    while quiet < 6 and time.monotonic() < end:
+        page.wait_for_timeout(500)
+        quiet = quiet + 1 if page.evaluate(at_rest) and not page.evaluate(waiting) else 0
+    assert quiet == 6, "the notebook did not get to its end"
+
+
 def pictures(cell):
     """The addresses of the pictures in a cell's output."""
     return cell.locator("img").evaluate_all("images => images.map(image => image.src)")
@@ -94,11 +106,7 @@ def test_a_notebook_runs_in_jupyterlab_and_its_explorer_answers_the_keyboard(not
     errors.clear()  # what a browser without a network says at the start is not the notebook's
     page.click("text=Run")
     page.click("text=Run All Cells")
-    page.wait_for_timeout(1500)
-    page.wait_for_selector('.jp-NotebookPanel-toolbar [data-status="idle"]', timeout=LONGEST)
-    page.wait_for_function(
-        "() => ![...document.querySelectorAll('.jp-InputPrompt')].some(p => p.innerText.includes('*'))"
-    )
+    wait_until_it_has_run(page)
     assert page.locator(BAD).count() == 0, page.locator(BAD).first.inner_text()
 
     slider = page.locator(".widget-slider .noUi-handle").first
