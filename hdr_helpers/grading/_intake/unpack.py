@@ -109,7 +109,7 @@ def _entry(parts, kind, modified=(), read=None, trouble="") -> Entry:
 
 def _leads_out(place: Path, home: Path) -> bool:
     try:
-        return not place.resolve().is_relative_to(home)
+        return not place.resolve(strict=True).is_relative_to(home)
     except (OSError, RuntimeError):  # a link that ends nowhere, or in itself
         return True
 
