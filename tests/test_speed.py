@@ -1,6 +1,7 @@
 """The benchmarks in a quick form: beside OpenCV in the same run, with a wide margin, so that a slip of speed is seen.
 
-Seen on a quiet machine: 0.35, 0.85 and 0.27; on one where every core is wanted thrice, 0.85 for the first. tests/benchmarks/ measure seconds at the size that the README speaks of.
+Seen on a quiet machine: 0.35, 0.85 and 0.27; where every core is wanted thrice, 0.85 for the first. tests/benchmarks/
+measure seconds, at the size that the README speaks of.
 """
 
 import sys
