@@ -16,11 +16,16 @@ from hdr_helpers.tonemap import OPERATORS, dynamic_range_stops, tonemap, write_p
 RADIANCE, CURVE, PLOT, PICTURE = "radiance.hdr", "crf.csv", "crf.png", "picture.png"
 
 
-def main(arguments=None) -> int:
-    """Run the command line. Returns the exit code: 0 done, 1 input or output can't be used (2 is argparse's)."""
+def forgive_the_console() -> None:
+    """See to it that a name which the console can't print does not end the run."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a name that the console can't print must not end the run
+            stream.reconfigure(errors="replace")
+
+
+def main(arguments=None) -> int:
+    """Run the command line. Returns the exit code: 0 done, 1 input or output can't be used (2 is argparse's)."""
+    forgive_the_console()
     options = _parser().parse_args(arguments)
     place = options.bracket.resolve()
     out = options.out or Path(f"{place.name if place.is_dir() else place.stem}_hdr")

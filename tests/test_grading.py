@@ -203,6 +203,7 @@ def test_a_folder_without_submissions_is_refused_in_a_sentence(given, said, tmp_
     flags = [] if SANDBOXED else ["--no-sandbox"]
     assert main(["grade", str(tmp_path / given), "-o", str(tmp_path / "out"), *flags]) == 1
     assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()  # nothing is left behind
 
 
 def test_fewer_than_one_worker_is_refused(tmp_path, capsys):

@@ -4,15 +4,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from hdr_helpers.grading.course import BUILD, ROOT, InstructorError, nbgrader_api, source_notebooks, stage
+from hdr_helpers.__main__ import forgive_the_console
+from hdr_helpers.grading.course import BUILD, ROOT, SEED, InstructorError, require_nbgrader, source_notebooks, stage
 from hdr_helpers.grading.release import TOP, release
 
 
 def main(arguments=None) -> int:
     """Run the command line. Returns the exit code: 0 done, 1 it can't be done (2 is argparse's)."""
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a name that the console can't print must not end the run
+    forgive_the_console()
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
@@ -37,6 +36,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_out(command, name: str, what: str) -> None:
+    said = f"{what} (default: {BUILD}/{name} in the course folder)"
+    command.add_argument("-o", "--out", type=Path, default=ROOT / BUILD / name, metavar="DIR", help=said)
+
+
 def _add_release(commands) -> None:
     command = commands.add_parser(
         "release",
@@ -47,14 +51,7 @@ def _add_release(commands) -> None:
         epilog="The zip is written beside DIR, as DIR.zip; from the same source it has the same bytes. "
         "Exit code: 0 done, 1 it can't be done, 2 wrong usage.",
     )
-    command.add_argument(
-        "-o",
-        "--out",
-        type=Path,
-        default=ROOT / BUILD / TOP,
-        metavar="DIR",
-        help=f"folder to make (default: {BUILD}/{TOP} in the course folder)",
-    )
+    _add_out(command, TOP, "folder to make")
     command.add_argument("--overwrite", action="store_true", help="replace an earlier student edition in DIR")
     command.set_defaults(run=_release)
 
@@ -71,18 +68,15 @@ def _add_grade(commands) -> None:
         help="grade submissions: a table, a report, feedback and a gradebook",
         description="Grade what a learning platform gives: a folder or a zip of submissions. Student code runs in a "
         "sandbox, without network, bounded in time, memory, processes and output; checks use other data than in the "
-        "notebooks. Written to OUT: grades.csv, report.html, feedback/ with a page for each student, and nbgrader's "
+        "notebooks. Written to DIR: grades.csv, report.html, feedback/ with a page for each student, and nbgrader's "
         "gradebook, in which answers in words are marked. Run again, it grades what is new and keeps what was marked.",
         epilog="Exit code: 0 done, 1 it can't be done, 2 wrong usage.",
     )
     command.add_argument("submissions", type=Path, metavar="SUBMISSIONS", help="a folder or a zip")
-    out = ROOT / BUILD / "grading"
-    command.add_argument(
-        "-o", "--out", type=Path, default=out, metavar="OUT", help=f"folder of the results (default: {BUILD}/grading)"
-    )
+    _add_out(command, "grading", "folder of the results")
     command.add_argument("--workers", type=int, default=2, metavar="N", help="students at one time (default: 2)")
     command.add_argument("--scheduler", metavar="ADDRESS", help="grade on the workers of this Dask scheduler")
-    command.add_argument("--seed", type=int, default=1997, metavar="N", help="of the checks' data (default: 1997)")
+    command.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"of the checks' data (default: {SEED})")
     command.add_argument("--memory", type=int, metavar="MB", help="that a notebook may use (default: 4096)")
     command.add_argument("--minutes", type=float, metavar="M", help="that a notebook may take (default: 15)")
     command.add_argument("--no-sandbox", action="store_true", help="run student code as you, with all your rights")
@@ -91,7 +85,7 @@ def _add_grade(commands) -> None:
 
 
 def _grade(options) -> None:
-    nbgrader_api(options.out)  # says it in a sentence where nbgrader is missing
+    require_nbgrader()
     from hdr_helpers.grading._running.sandbox import Bounds
     from hdr_helpers.grading.grade import Options, grade
 
@@ -126,14 +120,7 @@ def _add_pages(commands) -> None:
         description="Write the README and the notebooks with their outputs, but without solutions, as static web pages "
         "that need no network. Needs the extra 'pages'.",
     )
-    command.add_argument(
-        "-o",
-        "--out",
-        type=Path,
-        default=ROOT / BUILD / "pages",
-        metavar="DIR",
-        help=f"folder to write to (default: {BUILD}/pages)",
-    )
+    _add_out(command, "pages", "folder to write to")
     command.set_defaults(run=_pages)
 
 

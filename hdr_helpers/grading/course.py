@@ -13,6 +13,7 @@ from hdr_helpers.merge import write_whole
 
 ROOT = Path(__file__).parents[2]
 BUILD = "build"
+SEED = 1997  # of the data that submissions are graded with; that of the notebooks' own checks is 0
 IMAGES = {"image/jpeg": "expected.jpg", "image/png": "expected.png"}
 
 
@@ -83,19 +84,26 @@ def _picture_cell(grade_id: str, kind: str, content: str, alt: str) -> dict:
     }
 
 
-def nbgrader_api(place=ROOT / BUILD):
-    """nbgrader's programming interface for the course that is staged in place.
-
-    Raises InstructorError where nbgrader is not installed.
-    """
+def require_nbgrader() -> None:
+    """Raise InstructorError where nbgrader is not installed."""
     try:
-        from nbgrader.apps import NbGraderAPI
-        from traitlets.config import Config
+        import nbgrader.apps  # noqa: F401
     except ImportError as problem:
         raise InstructorError(
             f'This needs nbgrader ({problem}); install the extra "instructor" in the course folder: '
             'python -m pip install -e ".[instructor]"'
         ) from None
+
+
+def nbgrader_api(place=ROOT / BUILD):
+    """nbgrader's programming interface for the course that is staged in place.
+
+    Raises InstructorError where nbgrader is not installed.
+    """
+    require_nbgrader()
+    from nbgrader.apps import NbGraderAPI
+    from traitlets.config import Config
+
     # nbgrader calls alembic by its bare name, and an environment need not be activated to be used.
     scripts = str(Path(sys.executable).parent)
     if scripts not in os.environ.get("PATH", "").split(os.pathsep):

@@ -18,7 +18,7 @@ from hdr_helpers.grading._reporting.report import write_csv, write_report, write
 from hdr_helpers.grading._running.job import Job, nothing
 from hdr_helpers.grading._running.sandbox import Bounds, require_sandbox
 from hdr_helpers.grading._running.workers import Work, fingerprint, results
-from hdr_helpers.grading.course import InstructorError, nbgrader_api, source_notebooks, stage
+from hdr_helpers.grading.course import SEED, InstructorError, nbgrader_api, source_notebooks, stage
 from hdr_helpers.grading.gradebook import bring_up_to_date, enter, gradebook
 from hdr_helpers.grading.outcome import NotebookOutcome, StudentOutcome, from_json, to_json
 from hdr_helpers.grading.solutions import read_notebook
@@ -31,7 +31,6 @@ from pathlib import Path
 c = get_config()  # noqa: F821  nbgrader provides it
 c.CourseDirectory.root = str(Path(__file__).parent)
 """
-SEED = 1997  # of the examiner's data; the notebooks' own is 0
 
 
 @dataclass(frozen=True)

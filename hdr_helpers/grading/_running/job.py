@@ -24,7 +24,8 @@ from hdr_helpers.grading._running.execution import ExecuteSubmission, Task, numb
 from hdr_helpers.grading._running.sandbox import Bounds
 from hdr_helpers.grading.course import nbgrader_api
 from hdr_helpers.grading.outcome import NotebookOutcome, TodoOutcome, WrittenOutcome, to_json
-from hdr_helpers.lab.checks import TODOS
+from hdr_helpers.grading.solutions import is_written
+from hdr_helpers.lab.checks import most_points
 from hdr_helpers.lab.checks._todos import NOT_LOOKED_AT
 from hdr_helpers.merge import write_whole
 
@@ -97,11 +98,6 @@ def _by_nbgrader(place, name, student, task) -> tuple[Path, str]:
     return graded, f"nbgrader could not grade it: {' '.join(said[-1:])[:300]}"
 
 
-def marked_json(marked: list[dict]) -> str:
-    """marked_cells without what is big and not needed."""
-    return json.dumps([{key: part for key, part in cell.items() if key != "attachments"} for cell in marked])
-
-
 def numbers_in(marked) -> list[str]:
     """The numbers of the TODOs of a notebook, in order."""
     return [number for cell in map(nbformat.from_dict, marked) if (number := number_of(cell))]
@@ -109,7 +105,7 @@ def numbers_in(marked) -> list[str]:
 
 def _todo_outcome(number, task) -> TodoOutcome:
     result = task.results.get(number)
-    most = float(sum(points for points, _, _ in TODOS[number].parts))
+    most = most_points(number)
     if result is None:
         return TodoOutcome(number, 0.0, most, "unasked", ["The notebook was not run as far as this check."])
     said = [line.sentence for line in result.lines if line.state == "wrong" and line.sentence != NOT_LOOKED_AT]
@@ -127,27 +123,19 @@ def _todo_outcome(number, task) -> TodoOutcome:
 def _answers(notebook) -> list[WrittenOutcome]:
     """The answers in words. One that is as it was handed out gets 0 points from nbgrader, without an instructor."""
     found = []
-    for cell in notebook.cells:
-        facts = cell.metadata.get("nbgrader", {})
-        if facts.get("grade") and facts.get("solution"):
-            answered = facts.get("checksum") != compute_checksum(cell)
-            points = None if answered else 0.0
-            found.append(WrittenOutcome(facts["grade_id"], points, float(facts["points"]), answered))
+    for cell in filter(is_written, notebook.cells):
+        facts = cell.metadata.nbgrader
+        answered = facts.get("checksum") != compute_checksum(cell)
+        points = None if answered else 0.0
+        found.append(WrittenOutcome(facts["grade_id"], points, float(facts["points"]), answered))
     return found
 
 
 def nothing(name: str, kind: str, marked: list[dict], flag: str) -> NotebookOutcome:
     """The outcome of a notebook of which nothing could be graded."""
-    todos = [
-        TodoOutcome(number, 0.0, float(sum(points for points, _, _ in TODOS[number].parts)), "unasked", [flag])
-        for number in numbers_in(marked)
-    ]
-    facts = [cell["metadata"]["nbgrader"] for cell in marked]
-    written = [
-        WrittenOutcome(fact["grade_id"], 0.0, float(fact["points"]), answered=False)
-        for fact in facts
-        if fact.get("grade") and fact.get("solution")
-    ]
+    todos = [TodoOutcome(number, 0.0, most_points(number), "unasked", [flag]) for number in numbers_in(marked)]
+    facts = [cell["metadata"]["nbgrader"] for cell in filter(is_written, marked)]
+    written = [WrittenOutcome(fact["grade_id"], 0.0, float(fact["points"]), answered=False) for fact in facts]
     return NotebookOutcome(name, kind, todos, written, [flag])
 
 
