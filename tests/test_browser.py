@@ -45,8 +45,8 @@ def address(tmp_path_factory):
         port = free.getsockname()[1]
     command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ServerApp.port_retries=0"]
     options = [f"--port={port}", "--ip=127.0.0.1", "--IdentityProvider.token=", f"--ServerApp.root_dir={folder}"]
-    news = ["--LabApp.news_url=", "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"]
-    expose = ["--LabApp.expose_app_in_browser=True"]
+    options += ["--LabApp.news_url=", "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"]
+    options += ["--LabApp.expose_app_in_browser=True"]
     environment = os.environ | {
         "PYTHONPATH": str(folder),
         "HDR_CHECKS_MUST_PASS": "1",
@@ -54,7 +54,7 @@ def address(tmp_path_factory):
     }
     environment |= {"JUPYTER_CONFIG_DIR": str(folder / "config"), "JUPYTERLAB_SETTINGS_DIR": str(folder / "settings")}
     with open(folder / "log", "w") as log:
-        server = subprocess.Popen(command + options + news + expose, env=environment, cwd=folder, stdout=log, stderr=log)
+        server = subprocess.Popen(command + options, env=environment, cwd=folder, stdout=log, stderr=log)
     try:
         for _ in range(240):
             try:
