@@ -243,15 +243,17 @@ def crf_opencv(bracket: Bracket, method: str = "debevec") -> np.ndarray:
     bracket : Bracket; of 16-bit photographs the upper 8 bits speak
     method : "debevec" (CalibrateDebevec) or "robertson" (CalibrateRobertson), with OpenCV's defaults. Robertson's
         is NaN at values that no photograph holds, and gives white the mean exposure of all clipped pixels
-    Raises KeyError for another method.
+    Raises ValueError for another method.
 
     >>> ramp = np.arange(1, 121, dtype=np.uint8).repeat(90).reshape(120, 30, 3)
     >>> crf_opencv(Bracket((ramp, 2 * ramp), [0.1, 0.2], ("a", "b")))[:, 128].tolist()
     [0.0, 0.0, 0.0]
     """
-    create = {"debevec": cv2.createCalibrateDebevec, "robertson": cv2.createCalibrateRobertson}[method]
+    methods = {"debevec": cv2.createCalibrateDebevec, "robertson": cv2.createCalibrateRobertson}
+    if method not in methods:
+        raise ValueError(f"method must be one of {', '.join(methods)}; got {method!r}.")
     # OpenCV wants float32 times: with float64 Robertson's answers another curve, and says nothing.
     images = [in_8_bits(image) for image in bracket.images]
-    response = create().process(images, bracket.times.astype(np.float32))
+    response = methods[method]().process(images, bracket.times.astype(np.float32))
     curves = np.log(np.maximum(response[:, 0].T.astype(np.float64), 1e-12))
     return curves - curves[:, MIDDLE : MIDDLE + 1]

@@ -75,8 +75,6 @@ def tonemap(radiance, operator: str = "durand", **parameters) -> np.ndarray:
     >>> tonemap(grey, "gamma", gamma=1, stops=1)[0, :, 0].round(2).tolist()  # a stop more: the middle is white
     [0.5, 1.0, 1.0]
     """
-    if operator not in OPERATORS:
-        raise ValueError(f"Unknown operator {operator!r}; there are {', '.join(sorted(OPERATORS))}.")
     check_parameters(operator, parameters)
     scaled = expose_for_screen(radiance)
     if not scaled.any():
@@ -86,7 +84,7 @@ def tonemap(radiance, operator: str = "durand", **parameters) -> np.ndarray:
 
 
 def check_parameters(operator: str, parameters: dict) -> None:
-    """Raise ValueError for the first parameter that the operator does not have, or whose value is out of range.
+    """Raise ValueError for an unknown operator, a parameter that it does not have, or a value out of range.
 
     operator : a name in OPERATORS; parameters : dictionary from name to value
 
@@ -94,6 +92,8 @@ def check_parameters(operator: str, parameters: dict) -> None:
     Traceback (most recent call last):
     ValueError: gamma has no parameter 'gama'; it has gamma, stops.
     """
+    if operator not in OPERATORS:
+        raise ValueError(f"Unknown operator {operator!r}; there are {', '.join(sorted(OPERATORS))}.")
     known = dict(list(inspect.signature(OPERATORS[operator]).parameters.items())[1:])
     for name, value in parameters.items():
         if name not in known:

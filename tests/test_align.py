@@ -17,7 +17,7 @@ from hdr_helpers.lab.metrics import misplacement, radiance_error
 from hdr_helpers.lab.scenes import chapel_scene, random_scene
 from hdr_helpers.load import load_bracket
 from hdr_helpers.merge import merge_debevec
-from hdr_helpers.papers.ward2003 import disagreement, likely_shifts
+from hdr_helpers.papers.ward2003 import disagreement, likely_shifts, overlap
 
 SIXTEEN = 2.0 ** np.arange(16)  # one stop apart
 FOUR = np.array([1 / 30, 0.25, 2.5, 15])
@@ -425,3 +425,12 @@ def test_a_turned_set_with_a_moving_man_is_registered(real):
     # Far things and near ones have moved by up to 10 pixels less and more; it is registered between them.
     np.testing.assert_allclose(found.shifts[[0, 2]], [(33.7, 5.2), (50.4, 1.4)], atol=6)
     np.testing.assert_allclose(found.rotations[[0, 2]], (0.20, 0.43), atol=0.15)
+
+
+@pytest.mark.parametrize("shift", [(0, 0), (3, -2), (-5, 7), (11, 0), (0, -8), (30, -30)])
+def test_two_pictures_overlap_where_the_same_points_lie_on_each_other_and_not_at_all_farther_apart(shift):
+    rows, cols = np.mgrid[:8, :11]
+    here, there = overlap((8, 11), shift)
+    assert rows[here].shape == rows[there].shape
+    assert rows[here].size == max(11 - abs(shift[0]), 0) * max(8 - abs(shift[1]), 0)
+    assert np.all(cols[here] - cols[there] == shift[0]) and np.all(rows[here] - rows[there] == shift[1])

@@ -186,3 +186,10 @@ def test_the_chapels_truth_is_exactly_what_the_sensor_saw(chapel):
     assert np.array_equal(chapel.truth.crf, Camera().crf())
     np.testing.assert_allclose(chapel.times, CHAPEL_TIMES)
     assert chapel.images[0].shape == chapel.truth.radiance.shape
+
+
+def test_a_truth_without_shifts_is_stored_and_read_again(chapel, tmp_path):
+    tripod = replace(chapel.truth, shifts=None)
+    data.save_truth(tmp_path, tripod, 4)
+    again = data.with_truth(replace(chapel, truth=None), tmp_path).truth
+    assert again.shifts is None and np.array_equal(again.radiance, tripod.radiance)

@@ -18,6 +18,11 @@ def test_what_is_kept_is_carried():
     assert np.array_equal(carry.carry("crf", (3, 4), lambda: None), crf)
 
 
+def test_whole_numbers_are_carried_as_any_other():
+    carry.keep("radiance", np.arange(6).reshape(2, 3))
+    assert np.array_equal(carry.carry("radiance", (2, 3), lambda: None), [[0, 1, 2], [3, 4, 5]])
+
+
 def test_what_the_courses_function_made_in_the_place_of_a_todos_is_not_kept_as_the_students():
     def unfinished(images, B, lam, w, rows, cols):
         raise NotImplementedError()
@@ -33,9 +38,9 @@ def test_what_the_courses_function_made_in_the_place_of_a_todos_is_not_kept_as_t
     "content", [b"", b"not an array", None, np.zeros((2, 2)), np.full((3, 4), np.nan), np.eye(3, 4) > 0]
 )
 def test_what_can_not_be_used_is_replaced_by_the_courses_own(content):
+    carry.RESULTS.mkdir()
     if isinstance(content, bytes):
-        carry.RESULTS.mkdir()
         (carry.RESULTS / "crf.npy").write_bytes(content)
     elif content is not None:
-        carry.keep("crf", content)
+        np.save(carry.RESULTS / "crf.npy", content)
     assert carry.carry("crf", (3, 4), lambda: "the course's own") == "the course's own"

@@ -13,6 +13,7 @@ import scipy.linalg
 from hdr_helpers import crf
 from hdr_helpers.crf import (
     black_level,
+    crf_opencv,
     fitted_weights,
     gaussian_weights,
     gsolve,
@@ -431,3 +432,8 @@ def test_the_same_seed_gives_the_same_samples_and_another_one_others(small_brack
 def test_more_samples_than_pixels_are_refused(small_bracket):
     with pytest.raises(ValueError, match="19201 pixels were asked for; the photographs have 19200"):
         sample_pixels(small_bracket.images, 19201)
+
+
+def test_another_method_of_opencv_is_refused_and_the_two_are_named(chapel):
+    with pytest.raises(ValueError, match="debevec, robertson; got 'mertens'"):
+        crf_opencv(chapel, "mertens")

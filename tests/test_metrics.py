@@ -1,10 +1,13 @@
 """Measures of error that find a known error and overlook what is free."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hdr_helpers.lab.camera import Camera
-from hdr_helpers.lab.metrics import crf_rmse, psnr_mu, radiance_error
+from hdr_helpers.lab.metrics import crf_rmse, moving_error, one_photo_errors, psnr_l, psnr_mu, radiance_error
+from hdr_helpers.load import Truth
 
 TRUTH = np.exp(np.random.default_rng(0).normal(0, 2, (40, 50, 3))).astype(np.float32)
 
@@ -77,3 +80,22 @@ def test_psnr_ignores_one_scale_a_channel_and_survives_broken_pixels():
     noisy[0, 1] = np.inf
     noisy[0, 2] = 0
     assert np.isfinite(psnr_mu(noisy, TRUTH))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("measure", [psnr_mu, psnr_l])
+def test_psnr_of_what_is_equal_is_infinite_without_a_warning(measure):
+    truth = np.round(TRUTH * 4) / 4 + 1
+    assert measure(truth, truth) == np.inf
+
+
+def test_a_truth_that_does_not_know_what_moved_is_told_from_one_that_does():
+    with pytest.raises(ValueError, match="moved is None"):
+        moving_error(TRUTH, Truth(TRUTH, crf=None))
+
+
+def test_guesses_from_one_photograph_are_the_same_from_16_bits():
+    bracket = Camera(jpeg_quality=None).shoot(np.geomspace(0.01, 1, 3000).reshape(10, 100, 3), [0.1, 0.2])
+    deep = replace(bracket, images=[image.astype(np.uint16) << 8 for image in bracket.images])
+    medians = [[(a.median, b.median) for a, b in one_photo_errors(each)] for each in (bracket, deep)]
+    assert medians[0] == medians[1]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hdr_helpers.lab.scenes import chapel_scene
-from hdr_helpers.tonemap import OPERATORS, RANGES, tonemap
+from hdr_helpers.tonemap import OPERATORS, RANGES, check_parameters, tonemap
 
 PARAMETERS = [
     (operator, parameter.name, parameter.default)
@@ -82,3 +82,8 @@ def test_more_saturation_is_more_colourful_and_none_is_grey(radiance, operator):
     grey, some, much = (tonemap(radiance, operator, saturation=value) for value in (0, 0.6, 1.2))
     assert np.ptp(grey, axis=2).max() < 1e-5
     assert np.ptp(some, axis=2).mean() < np.ptp(much, axis=2).mean() - 0.02
+
+
+def test_an_unknown_operator_is_refused_by_a_check_of_its_parameters_alone():
+    with pytest.raises(ValueError, match=r"'glow'.*durand, gamma"):
+        check_parameters("glow", {})

@@ -15,7 +15,7 @@ RESULTS = Path(os.environ.get("HDR_RESULTS", "results"))
 def keep(name: str, array, made_by=None) -> None:
     """Save a result of yours for the next notebooks, as results/NAME.npy.
 
-    name : without suffix; array : float, any shape; carry takes no integers
+    name : without suffix; array : numbers, any shape; integers are kept as float
     made_by : the function that made it; what the course's own made in the place of a TODO's is not kept
 
     >>> keep("example", np.zeros((3, 256)))
@@ -26,7 +26,7 @@ def keep(name: str, array, made_by=None) -> None:
         return
     RESULTS.mkdir(exist_ok=True)
     content = io.BytesIO()
-    np.save(content, array)
+    np.save(content, np.asarray(array, dtype=np.result_type(array, np.float32)))
     write_whole(RESULTS / f"{name}.npy", content.getvalue())
     print(f"Kept for the next notebooks: {name}.npy")
 

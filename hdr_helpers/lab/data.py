@@ -56,7 +56,7 @@ def with_truth(bracket: Bracket, folder) -> Bracket:
     try:
         with np.load(path) as stored:
             radiance = (stored["radiance"].astype(np.float32) * stored["scale"]).astype(np.float32)
-            truth = Truth(radiance, stored["crf"], stored["shifts"], stored.get("rotations"), stored.get("moved"))
+            truth = Truth(radiance, stored["crf"], stored.get("shifts"), stored.get("rotations"), stored.get("moved"))
     except (KeyError, ValueError) as problem:
         raise BracketError(f"{path} is not a truth file ({problem}); remove it, or make the bracket again.") from None
     if truth.radiance.shape != bracket.images[0].shape:
@@ -89,9 +89,9 @@ def what_loading_says(bracket_folder, times: dict) -> list[str]:
 
 
 def save_truth(folder, truth: Truth, scale: float) -> None:
-    """Write folder/truth.npz: radiance / scale as float16, crf as float64, shifts, and rotations and moved if known.
+    """Write folder/truth.npz: radiance / scale as float16, crf as float64, and what else of it is known.
 
-    folder : path; truth : Truth with shifts; scale : as float16 ends at 65504, brighter scenes need one
+    folder : path; truth : Truth; scale : as float16 ends at 65504, brighter scenes need one
     The same bytes everywhere, so neither np.savez, which writes the name of the system, nor a compressor,
     which would save a tenth and depends on its version.
 
@@ -102,8 +102,9 @@ def save_truth(folder, truth: Truth, scale: float) -> None:
     True
     """
     half = (truth.radiance / scale).astype(np.float16)
-    arrays = {"radiance": half, "scale": np.float32(scale), "crf": truth.crf, "shifts": truth.shifts}
-    arrays |= {k: v for k, v in (("rotations", truth.rotations), ("moved", truth.moved)) if v is not None}
+    arrays = {"radiance": half, "scale": np.float32(scale), "crf": truth.crf}
+    known = {"shifts": truth.shifts, "rotations": truth.rotations, "moved": truth.moved}
+    arrays |= {name: array for name, array in known.items() if array is not None}
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
         for name, array in arrays.items():

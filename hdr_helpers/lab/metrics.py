@@ -78,7 +78,7 @@ def psnr_mu(radiance, truth, mu: float = 5000.0) -> float:
     def compress(light):
         return np.log1p(mu * np.tanh(light / white)) / np.log1p(mu)
 
-    return float(-10 * np.log10(np.mean((compress(radiance) - compress(truth)) ** 2)))
+    return _decibel(compress(radiance) - compress(truth))
 
 
 def psnr_l(radiance, truth) -> float:
@@ -93,7 +93,13 @@ def psnr_l(radiance, truth) -> float:
     40.0
     """
     radiance, truth = _same_scale(radiance, truth)
-    return float(-10 * np.log10(np.mean(((radiance - truth) / truth.max()) ** 2)))
+    return _decibel((radiance - truth) / truth.max())
+
+
+def _decibel(error) -> float:
+    """PSNR of an error whose peak is 1; infinite where there is none."""
+    with np.errstate(divide="ignore"):
+        return float(-10 * np.log10(np.mean(error**2)))
 
 
 def _same_scale(radiance, truth):
@@ -146,7 +152,7 @@ def held_out(bracket, k: int, merge) -> tuple[np.ndarray, np.ndarray]:
 def one_photo_errors(bracket) -> list[tuple[RadianceError, RadianceError]]:
     """For each photograph the RadianceError of two guesses: by a gamma of 2.2, and by the camera's true curve.
 
-    bracket : Bracket of uint8 with its Truth
+    bracket : Bracket with its Truth; of 16-bit photographs the upper 8 bits speak
 
     >>> from hdr_helpers.lab.camera import Camera
     >>> scene = np.geomspace(0.01, 1, 300).reshape(10, 10, 3)
@@ -157,6 +163,7 @@ def one_photo_errors(bracket) -> list[tuple[RadianceError, RadianceError]]:
     crf, truth = bracket.truth.crf, bracket.truth.radiance
     errors = []
     for image in bracket.images:
+        image = in_8_bits(image)
         by_gamma = np.maximum(image / np.float32(255), 1 / 512) ** 2.2  # value 0 is not zero light
         by_curve = np.exp(np.stack([g[image[..., c]] for c, g in enumerate(crf)], axis=-1))
         errors.append((radiance_error(by_gamma, truth), radiance_error(by_curve, truth)))
@@ -204,7 +211,7 @@ def moving_error(radiance, truth) -> MovingError:
 
     radiance : (H, W, 3) float; truth : Truth with radiance and moved
     One scale for each channel is removed, the median over what stood still: ghosts must not hide in it.
-    Returns a MovingError.
+    Returns a MovingError. Raises ValueError where the truth does not know what moved.
 
     >>> from hdr_helpers.load import Truth
     >>> moved = np.zeros((20, 20), dtype=bool)
@@ -214,6 +221,8 @@ def moving_error(radiance, truth) -> MovingError:
     >>> error.moving, error.still  # a ghost twice as bright
     (1.0, 0.0)
     """
+    if truth.moved is None:
+        raise ValueError("This truth does not know what moved: its moved is None; compare with radiance_error.")
     near = cv2.dilate(truth.moved.view(np.uint8), np.ones((9, 9), np.uint8)) > 0
     with np.errstate(all="ignore"):
         stops = np.log2(radiance) - np.log2(truth.radiance)

@@ -137,7 +137,7 @@ def halved(gray, valid) -> tuple[np.ndarray, np.ndarray]:
 def overlap(shape, shift) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """Where two arrays of one shape lie on each other when the second is moved by (dx, dy) whole pixels.
 
-    shape : (H, W), of both; shift : (dx, dy), not larger than they are
+    shape : (H, W), of both; shift : (dx, dy); one beyond their size leaves no overlap
     Returns the rows and columns of the first, and those of the second.
 
     >>> here, there = overlap((1, 5), shift=(2, 0))
@@ -145,7 +145,8 @@ def overlap(shape, shift) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     >>> row[here].tolist(), row[there].tolist()
     ([[2, 3, 4]], [[0, 1, 2]])
     """
-    (height, width), (dx, dy) = shape, shift
+    height, width = shape
+    dx, dy = (max(-size, min(step, size)) for step, size in zip(shift, (width, height), strict=True))
     here = np.s_[max(dy, 0) : height + min(dy, 0), max(dx, 0) : width + min(dx, 0)]
     there = np.s_[max(-dy, 0) : height + min(-dy, 0), max(-dx, 0) : width + min(-dx, 0)]
     return here, there
