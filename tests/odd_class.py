@@ -13,7 +13,7 @@ from hdr_helpers.grading.solutions import BEGIN
 
 CLASS = {}
 ALL, NONE = "right right right", "unasked unasked unasked"
-GRADED, STOPPED = ("graded", "missing"), ("stopped", "missing")
+GRADED = ("graded", "missing")
 
 
 class Due(NamedTuple):
@@ -71,9 +71,9 @@ def a_loop_in_a_function_and_100_MB_printed_in_another(student):
 
 
 @due("wrong wrong right", *each("TODO {}, when its check ran it: it could not be interr", "3.1", "3.2"), t31="went on")
-def a_loop_that_catches_everything_and_one_in_c(student):
-    turn = "        try:\n            while True:\n                pass\n        except BaseException:\n"
-    student.write("todo-3-1", f"    while True:\n{turn}            pass")
+def a_loop_that_stops_the_clock_and_one_in_c(student):
+    stop = "    import signal\n    signal.signal(signal.SIGALRM, signal.SIG_IGN)\n"
+    student.write("todo-3-1", f"{stop}    while True:\n        pass")
     student.write("todo-3-2", "    import itertools\n    return sum(itertools.repeat(0))")
 
 
@@ -123,8 +123,9 @@ def leaves_by_os_exit_in_a_function_and_in_a_cell(student):
     student.insert("todo-3-2", "import os\nos._exit(3)")
 
 
-@due("right unasked unasked", *each("Cell {} was left out, because it", 4, 5, 6, 7), kinds=STOPPED, t32="stopped b")
-def ends_its_kernel_in_one_cell_after_another(student):
+@due("wrong right right", "TODO 3.1, when its", *each("Cell {} was left out, because it", 4, 5, 6, 7), t31="ended")
+def ends_its_kernel_in_a_function_and_in_one_cell_after_another(student):
+    student.write("todo-3-1", "    import os\n    os._exit(3)")
     for _ in range(4):
         student.insert("todo-3-2", "import os\nos._exit(3)")
 

@@ -14,7 +14,7 @@ if find_spec("nbgrader") is None:
 
 import psutil
 from kernels import SECRET, Kernel, sandboxed
-from short_course import Student, short_course
+from short_course import Student, short_course, shorter_course
 
 from hdr_helpers.grading._running import sandbox
 from hdr_helpers.grading._running.examiner import Examiner
@@ -186,6 +186,18 @@ def test_without_a_sandbox_a_submission_is_graded(tmp_path):
     options = Options(workers=1, sandboxed=False)
     (ada,) = grade(tmp_path / "in", tmp_path / "out", options, say=lambda _: None, notebooks=source)
     assert ada.todos and all(todo.state == "right" for todo in ada.todos) and not ada.all_flags
+
+
+@sandboxed
+def test_what_comes_after_the_time_of_a_notebook_is_over_is_not_run_and_what_came_before_counts(tmp_path):
+    source = shorter_course(tmp_path / "source")[:1]
+    Student(source).insert("todo-3-2", "import time\ntime.sleep(20)").hand_in(tmp_path / "in" / "ada")
+    options = Options(bounds=Bounds(notebook=20))
+    (ada,) = grade(tmp_path / "in", tmp_path / "out", options, say=lambda _: None, notebooks=source)
+    assert [todo.state for todo in ada.todos] == ["right", "unasked", "unasked"]
+    assert ada.todos[1].said == ["The check was not reached, because the notebook was stopped before."]
+    assert ada.notebooks[0].kind == "stopped"
+    assert ada.notebooks[0].flags == ["It took more than 20 seconds; cell 5 and later were not run."]
 
 
 @pytest.fixture

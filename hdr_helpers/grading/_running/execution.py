@@ -1,6 +1,6 @@
 """Running a submitted notebook: nbgrader's Execute with a watched kernel, bounds, and an examiner for the checks.
 
-Where a cell ends its kernel, the notebook is run once more without that cell, so that one bad cell costs no other.
+Where a cell ends its kernel, the notebook is run once more without that cell, so that bad cells cost no others.
 """
 
 import os
@@ -18,7 +18,6 @@ from hdr_helpers.grading._running.kernel import Watch, kernel_manager
 from hdr_helpers.grading._running.sandbox import MB, SCRATCH, Bounds
 from hdr_helpers.lab.checks._running import shortened
 
-RUNS = 4  # of one notebook
 BEGINNING = "get_ipython().ask_exit = lambda: None"  # exit() ends a kernel a moment later, in some other cell
 PRELUDE = "from hdr_helpers.lab.checks import check, hint"
 ENDINGS = {
@@ -65,7 +64,8 @@ class ExecuteSubmission(Execute):
         """Run all cells, then put what the examiner found into the check cells."""
         task = self.task
         self.store_widget_state = False
-        self.skipped, self.watch, self.deadline = {}, None, time.monotonic() + task.bounds.notebook
+        self.skipped, self.ended, self.watch = {}, set(), None
+        self.deadline = time.monotonic() + task.bounds.notebook
         (task.folder / SCRATCH).mkdir(parents=True, exist_ok=True)
         self.examiner = Examiner(
             str(task.folder / SCRATCH / "examiner") if os.name == "posix" else None,
@@ -75,8 +75,8 @@ class ExecuteSubmission(Execute):
             stop=lambda: self.watch.kill("examiner"),
         )
         try:
-            if not any(self._runs_to_its_end(nb, resources) for _ in range(RUNS)):
-                task.stopped = True
+            while not self._runs_to_its_end(nb, resources):  # each run leaves one thing more out
+                pass
         finally:
             self.examiner.close()
         task.results = self.examiner.results
@@ -88,7 +88,7 @@ class ExecuteSubmission(Execute):
         return nb, self.resources
 
     def _runs_to_its_end(self, nb, resources) -> bool:
-        """Run the notebook; where that fails, see to it that the next run does not fail there."""
+        """Run the notebook; where that fails, see to it that the next run does not fail there for the same reason."""
         self.at, self.began = 0, False
         try:
             super().preprocess(nb, resources)
@@ -103,7 +103,8 @@ class ExecuteSubmission(Execute):
                 self.watch.kill("over")
                 self.watch.stop()
         number, said = number_of(nb.cells[self.at]), ENDINGS[why].format(**vars(self.task.bounds))
-        if number in self.examiner.results:  # it remembers, and does not ask for this function again
+        if number in self.examiner.results and number not in self.ended:  # it does not ask for this function again
+            self.ended.add(number)
             self.task.flags.append(f"TODO {number}, when its check ran it: {said}. The notebook was run once more.")
         else:
             self.skipped[self.at] = f"Cell {self.at + 1} was left out, because {said}."
