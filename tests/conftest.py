@@ -10,6 +10,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import cv2
 import pytest
 
+from hdr_helpers.grading.release import release
 from hdr_helpers.lab import data
 from hdr_helpers.lab.brackets import CHAPEL_TIMES
 from hdr_helpers.lab.camera import Camera
@@ -37,6 +38,12 @@ def chapel():
 def small_bracket():
     """A part of the chapel, 160 x 120 pixels, at 1/400, 1/60, 1/10, 0.6 and 4 seconds; with its truth."""
     return Camera(seed=3, jpeg_quality=None).shoot(chapel_scene()[100:220, 200:360], CHAPEL_TIMES[::2])
+
+
+@pytest.fixture(scope="session")
+def edition(tmp_path_factory):
+    """The student edition of the course itself, made once: its folder and its zip."""
+    return release(tmp_path_factory.mktemp("release") / "edition")
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ if find_spec("nbgrader") is None:
 
 import psutil
 from kernels import SECRET, Kernel, sandboxed
-from short_course import Student, short_course, shorter_course
+from short_course import Student, shorter_course
 
 from hdr_helpers.grading._running import sandbox
 from hdr_helpers.grading._running.examiner import Examiner
@@ -181,7 +181,7 @@ def test_without_a_sandbox_a_notebook_finds_the_course_where_it_looks_for_it(tmp
 
 
 def test_without_a_sandbox_a_submission_is_graded(tmp_path):
-    source = short_course(tmp_path / "source")[1:]
+    source = shorter_course(tmp_path / "source")[1:]
     Student(source).hand_in(tmp_path / "in" / "ada")
     options = Options(workers=1, sandboxed=False)
     (ada,) = grade(tmp_path / "in", tmp_path / "out", options, say=lambda _: None, notebooks=source)

@@ -1,6 +1,7 @@
 """The student edition: nothing of the solutions is left in it, and all that a student needs is."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -32,12 +33,6 @@ needs_nbgrader = pytest.mark.skipif(
 @pytest.fixture
 def tiny_course(tmp_path):
     return tiny.tiny_course(tmp_path / "course")
-
-
-@pytest.fixture(scope="session")
-def edition(tmp_path_factory):
-    """The student edition of the course itself: its folder and its zip."""
-    return release(tmp_path_factory.mktemp("release") / "edition")
 
 
 def test_a_zip_has_the_same_bytes_whatever_the_dates_and_the_order_of_its_files(tmp_path):
@@ -207,6 +202,7 @@ def test_the_edition_has_what_the_start_command_needs(edition):
     assert (folder / "environment.txt").read_bytes() == (ROOT / "environment.txt").read_bytes()
     there = sorted(path.name for path in (folder / "notebooks").iterdir())
     assert there == [path.name for path in NOTEBOOKS]
+    assert not (folder / "hdr_helpers" / "grading").exists()
     run = subprocess.run(
         [sys.executable, "-c", "import hdr_helpers.lab.figures as f; print(f.__file__)"],
         cwd=folder,
@@ -224,3 +220,25 @@ def test_with_the_solutions_filled_in_every_cell_is_the_sources_again(edition, s
     unmarked = re.compile(r"^\s*(<!-- )?### (BEGIN|END) SOLUTION( -->)?(\n|$)", re.M)
     wanted = {cell["id"]: unmarked.sub("", cell["source"]).rstrip() for cell in read_notebook(source)["cells"]}
     assert {c["id"]: c["source"].rstrip() for c in filled["cells"] if not c["id"].endswith("-expected")} == wanted
+
+
+@needs_nbgrader
+def test_every_check_of_an_empty_todo_says_so_and_gives_no_points(edition, tmp_path):
+    stubs = {path: json.loads(path.read_text(encoding="utf-8")) for path in (edition[0] / "notebooks").glob("*.ipynb")}
+    assert len(stubs) == 5
+    script = ["from hdr_helpers.lab.checks import check"]
+    for notebook in stubs.values():
+        for cell in notebook["cells"]:
+            grade_id = cell["metadata"].get("nbgrader", {}).get("grade_id", "")
+            if grade_id.startswith("check-"):
+                number, name = grade_id.removeprefix("check-").replace("-", "."), "".join(cell["source"])
+                name = name.split(", ")[1].split(")")[0]
+                script.append(f"def {name}(*_, **__): raise NotImplementedError()")
+                script.append(f'result = check("{number}", {name}); print(result.points, result.started, result.last)')
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(script)], capture_output=True, text=True, cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(edition[0]), "HDR_CHECKS_MUST_PASS": "0"},
+    )  # fmt: skip
+    lines = done.stdout.splitlines()
+    assert len(lines) == 17, done.stderr
+    assert all(line.startswith("0.0 False Not started yet") for line in lines)

@@ -34,7 +34,7 @@ def test_every_parameter_changes_the_picture(radiance, operator, name, default):
 @every_parameter
 def test_every_parameter_is_documented_with_its_range_which_holds_its_default(operator, name, default):
     least, most = RANGES[name]
-    text = re.search(rf"^    {name} : (.*)$", OPERATORS[operator].__doc__, re.M).group(1)
+    text = re.search(rf"^{name} : (.*)$", inspect.getdoc(OPERATORS[operator]), re.M).group(1)
     assert text.startswith(f"{least:g} or more;" if most == np.inf else f"{least:g}..{most:g};".replace("1e+06", "1e6"))
     assert default is None or least <= default <= most
 

@@ -11,7 +11,7 @@ import pytest
 import tiny_course as tiny
 
 from hdr_helpers.grading.course import InstructorError
-from hdr_helpers.grading.release import _checked, release
+from hdr_helpers.grading.release import _checked
 from hdr_helpers.grading.solutions import (
     Written,
     all_strings,
@@ -31,12 +31,6 @@ needs_nbgrader = pytest.mark.skipif(
     find_spec("nbgrader") is None, reason='nbgrader is not among the seven packages: pip install -e ".[instructor]"'
 )
 MARKER = r"\*For the marker:\* 1 point for .+, 1 for .+\."
-
-
-@pytest.fixture(scope="module")
-def edition(tmp_path_factory):
-    """The folder of the student edition."""
-    return release(tmp_path_factory.mktemp("release") / "edition")[0]
 
 
 def answer_cells(notebook):
@@ -193,7 +187,7 @@ def test_an_answer_without_its_stub_is_not_handed_out():
 @needs_nbgrader
 @each_notebook
 def test_a_students_cell_for_an_answer_holds_the_stub_and_nothing_else_and_is_worth_its_points(edition, notebook):
-    cells = answer_cells(edition / "notebooks" / notebook.name)
+    cells = answer_cells(edition[0] / "notebooks" / notebook.name)
     assert [cell["source"] for cell in cells] == ["YOUR ANSWER HERE"] * 2
     for there, here in zip(cells, answer_cells(notebook), strict=True):
         settings = there["metadata"]["nbgrader"]
@@ -205,7 +199,7 @@ def test_a_students_cell_for_an_answer_holds_the_stub_and_nothing_else_and_is_wo
 def test_the_edition_holds_no_line_of_a_model_answer_and_all_questions(edition):
     exercises = [exercise for path in NOTEBOOKS for exercise in written(read_notebook(path))]
     assert len(exercises) == 10
-    for path in (path for path in edition.rglob("*") if path.suffix in (".ipynb", ".py", ".md", ".txt", ".toml")):
+    for path in (path for path in edition[0].rglob("*") if path.suffix in (".ipynb", ".py", ".md", ".txt", ".toml")):
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".ipynb":
             text = all_strings(json.loads(text) | {"cells": read_notebook(path)["cells"]})

@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -216,13 +217,10 @@ def _write_feedback(out, stale, workers, say) -> None:
     if not stale:
         return
     say(f"Writing feedback for {len(stale)} students.")
+    names = [[name for name, _ in pages] for pages in stale.values()]
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        waiting = [
-            (student, pages, pool.submit(feedback, out, student, [name for name, _ in pages]))
-            for student, pages in stale.items()
-        ]
-        for student, pages, future in waiting:
-            done = future.result()
+        spread = pool.map if len(stale) > 1 else map  # a process for one student takes longer than the pages
+        for (student, pages), done in zip(stale.items(), spread(partial(feedback, out), stale, names), strict=True):
             for name, facts in pages:
                 if name in done:
                     _write_facts(out, student, name, facts)
