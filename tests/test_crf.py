@@ -200,10 +200,10 @@ def shot(family, count, jpeg=None):
     return FAMILIES[family](jpeg_quality=jpeg, bits=16).shoot(random_scene(5, (384, 576)), COUNTS[count])
 
 
-def opencvs(bracket, samples=70):
+def opencvs(bracket):
     """OpenCV's CalibrateDebevec, called directly, on BGR as it is used to."""
     bgr = [np.ascontiguousarray(image[..., ::-1]) for image in bracket.images]
-    response = cv2.createCalibrateDebevec(samples).process(bgr, bracket.times.astype(np.float32))
+    response = cv2.createCalibrateDebevec().process(bgr, bracket.times.astype(np.float32))
     return np.log(response[:, 0, ::-1].T.astype(np.float64))
 
 
@@ -271,7 +271,7 @@ def test_the_curve_stays_where_size_half_or_photographs_change(family, count, jp
         np.s_[::2, ::2], np.s_[1::3, 1::3], np.s_[:192], np.s_[192:], np.s_[:, :288], np.s_[:, 288:]))]  # fmt: skip
     variants += [thinned(bracket, np.s_[:], photographs) for photographs in (slice(1, None), slice(-1))]
     ours = [recover_crf(variant).crf for variant in variants]
-    theirs = [opencvs(variant) for variant in variants] + [opencvs(bracket, samples) for samples in (50, 100, 150)]
+    theirs = [opencvs(variant) for variant in variants]
     assert np.mean(spread(ours)) <= np.mean(spread(theirs)) / 5
 
 

@@ -99,6 +99,17 @@ def test_only_the_check_of_the_cell_that_runs_counts(make):
     assert examiner.results.keys() == {"3.1"} and examiner.results["3.1"].passed
 
 
+def test_a_question_of_an_earlier_cell_that_is_read_late_does_not_count(make, monkeypatch):
+    examiner = make()
+    examiner.expect("3.1", "now")
+    for ticket in ("", "before"):
+        monkeypatch.setenv("HDR_TICKET", ticket)
+        assert check("3.1", RIGHT["3.1"]).passed and not examiner.results
+    monkeypatch.setenv("HDR_TICKET", "now")
+    check("3.1", RIGHT["3.1"])
+    assert examiner.results["3.1"].passed
+
+
 FULL = {"number": "3.3", "last": "", "own": True, "difference": "", "notes": [], "lines": [("right", "All.", 7.0)]}
 
 

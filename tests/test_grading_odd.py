@@ -50,7 +50,7 @@ def test_an_odd_submission_gets_what_is_due_and_the_reason(graded, name):
         assert todos[number].said or state in ("right", "empty")
     assert tuple(notebook.kind for notebook in student.notebooks) == odd.kinds
     flags = [flag for flag in student.all_flags if flag != "04_merge: It was not handed in."]
-    assert len(flags) == len(odd.flags), flags
+    assert len(flags) == len(odd.flags), "\n".join(flags)
     for flag, words in zip(flags, odd.flags, strict=True):
         assert words in flag
     for number, words in odd.said.items():

@@ -41,7 +41,7 @@ class Examiner:
         self.seed, self.limit, self.stop = seed, limit, stop
         self.results = {}  # of check cells: number -> Result
         self._ended = {}  # of functions that ended their kernel: they are not called again
-        self._cell = None  # number of the check cell that runs now
+        self._cell = None, ""  # number and ticket of the check cell that runs now
         self._silent, self._one, self._closed = [], threading.Lock(), False
         if scratch is not None:
             tempfile.tempdir = str(scratch)
@@ -49,9 +49,12 @@ class Examiner:
         self.address = self._listener.address
         threading.Thread(target=self._serve, daemon=True).start()
 
-    def expect(self, number) -> None:
-        """From now on the cell of this check runs; None for any other cell. Only what it asks for counts."""
-        self._cell = number
+    def expect(self, number, ticket: str = "") -> None:
+        """From now on the cell of this check runs; None for any other cell. Only what it asks for counts.
+
+        ticket : what the cell shows with its question; whatever is read late, and was asked before, shows another
+        """
+        self._cell = number, ticket
 
     def settle(self, seconds: float = GRACE) -> None:
         """Wait until nothing is being looked at."""
@@ -81,15 +84,16 @@ class Examiner:
         # The caller may go away, or never speak our language; its check cell then has no result.
         with line, suppress(OSError, EOFError, WireError):
             try:
-                asked = line.hear(FIRST, QUESTION).get("check")
+                question = line.hear(FIRST, QUESTION)
             finally:
                 self._silent.remove(line)
+            asked = question.get("check")
             if isinstance(asked, str) and asked in TODOS:
                 with self._one:
-                    self._examine(line, asked)
+                    self._examine(line, asked, str(question.get("ticket", "")))
 
-    def _examine(self, line, asked):
-        counts, todo = asked == self._cell, TODOS[asked]
+    def _examine(self, line, asked, ticket):
+        counts, todo = (asked, ticket) == self._cell, TODOS[asked]
         result = self._ended.get(asked)
         if result is None:
             caller = Caller(line, self.stop)

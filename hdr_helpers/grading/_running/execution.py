@@ -4,6 +4,7 @@ Where a cell ends its kernel, the notebook is run once more without that cell, s
 """
 
 import os
+import secrets
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,10 +17,11 @@ from hdr_helpers.grading._running.examiner import GRACE, Examiner, unasked
 from hdr_helpers.grading._running.harmless import harmless
 from hdr_helpers.grading._running.kernel import Watch, kernel_manager
 from hdr_helpers.grading._running.sandbox import MB, SCRATCH, Bounds
+from hdr_helpers.lab.checks._examined import TICKET
 from hdr_helpers.lab.checks._running import shortened
 
 BEGINNING = "get_ipython().ask_exit = lambda: None"  # exit() ends a kernel a moment later, in some other cell
-PRELUDE = "from hdr_helpers.lab.checks import check, hint"
+PRELUDE = f"from hdr_helpers.lab.checks import check, hint\n__import__('os').environ['{TICKET}'] = {{!r}}"
 ENDINGS = {
     "dead": "it ended the kernel",
     "memory": "it took more than {memory} MB of memory",
@@ -137,7 +139,8 @@ class ExecuteSubmission(Execute):
             cell["outputs"] = []
             return cell, resources
         number, bounds = number_of(cell), self.task.bounds
-        self.examiner.expect(number)
+        ticket = secrets.token_hex(8)
+        self.examiner.expect(number, ticket)
         # The examiner ends a check by itself, and knows why.
         self.timeout = int(max(bounds.cell, bounds.check + 2 * GRACE) if number else bounds.cell)
         self.raise_on_iopub_timeout = False  # a cell that ended and whose output comes late is no slow cell
@@ -145,7 +148,7 @@ class ExecuteSubmission(Execute):
             self.fresh = False
             self._run_our_own(BEGINNING, index)
         if number:  # a student may have used the name for something else
-            self._run_our_own(PRELUDE, index)
+            self._run_our_own(PRELUDE.format(ticket), index)
         cell, resources = super().preprocess_cell(cell, resources, index)
         if any(output.get("ename") == "CellTimeoutError" for output in cell.get("outputs", ())):
             self.task.flags.append(f"Cell {index + 1} was interrupted after {self.timeout} seconds.")
