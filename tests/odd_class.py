@@ -73,17 +73,17 @@ def a_loop_in_a_function_and_100_MB_printed_in_another(student):
 @due("wrong wrong right", *each("TODO {}, when its check ran it: it could not be interr", "3.1", "3.2"), t31="went on")
 def a_loop_that_stops_the_clock_and_one_in_c(student):
     stop = "    import signal\n    signal.signal(signal.SIGALRM, signal.SIG_IGN)\n"
-    student.write("todo-3-1", f"{stop}    while True:\n        pass")
+    student.write("todo-3-1", f"{stop}    import time\n    while True:\n        time.sleep(1)")
     student.write("todo-3-2", "    import itertools\n    return sum(itertools.repeat(0))")
 
 
-@due(ALL, *each("Cell {} was interrupted after 8 seconds", 2, 5))
+@due(ALL, *each("Cell {} was interrupted after 12 seconds", 2, 5))
 def a_loop_in_a_cell_and_a_shell_that_sleeps(student):
-    student.insert("todo-3-1", "while True:\n    pass")
+    student.insert("todo-3-1", "import time\nwhile True:\n    time.sleep(0.1)")
     student.insert("todo-3-2", "%%bash\nsleep 1000")
 
 
-@due(ALL, "Cell 4 was left out, because it went on for more than 8 seconds and could not be interrupted")
+@due(ALL, "Cell 4 was left out, because it went on for more than 12 seconds and could not be interrupted")
 def a_loop_in_c_in_a_cell(student):
     student.insert("todo-3-2", "import itertools\nsum(itertools.repeat(0))")
 

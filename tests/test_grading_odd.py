@@ -20,7 +20,7 @@ from hdr_helpers.grading.grade import Options, grade
 
 pytestmark = pytest.mark.skipif(bubblewrap() is None, reason="There is no bubblewrap, and odd code needs a sandbox.")
 
-BOUNDS = Bounds(cell=8, notebook=90, memory=800, processes=40, output=1, disk=64, check=8)
+BOUNDS = Bounds(cell=12, notebook=90, memory=800, processes=40, output=1, disk=64, check=8)
 NUMBERS = ("3.1", "3.2", "3.4", "4.3")
 
 
