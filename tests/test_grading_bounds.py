@@ -221,8 +221,13 @@ def fake(folder, script):
     return f"{folder}:/usr/bin:/bin"
 
 
-def test_a_bubblewrap_that_may_not_make_namespaces_counts_as_none(fresh, monkeypatch, tmp_path):
-    monkeypatch.setenv("PATH", fake(tmp_path / "bin", "echo 'bwrap: No permissions' >&2; exit 1"))
+# As in a container that allows nothing, and in one that allows namespaces but no /proc in them.
+NOT_ENOUGH = ["exit 1", 'for word; do [ "$word" = --proc ] && exit 1; done; exit 0']
+
+
+@pytest.mark.parametrize("script", NOT_ENOUGH)
+def test_a_bubblewrap_that_may_not_do_all_that_is_asked_of_it_counts_as_none(script, fresh, monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", fake(tmp_path / "bin", script))
     with pytest.raises(InstructorError, match="no sandbox here"):
         require_sandbox()
 

@@ -23,6 +23,8 @@ FILTER = "9"  # number under which bubblewrap finds the filter of calls opened
 LINE, SCRATCH = "line", "scratch"  # folders of a job that its kernel gets: one to speak in, one to read from
 ISOLATED = ("--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL")
 NO_NESTS = ("--unshare-user", "--disable-userns")  # no namespaces within, in which a student could mount things
+# Read-only, for where root grades, the settings of the whole machine are files of its own in /proc/sys.
+SYSTEM_OF_ITS_OWN = ("--proc", "/proc", "--remount-ro", "/proc", "--dev", "/dev", "--remount-ro", "/dev")
 MB = 2**20
 
 
@@ -45,12 +47,14 @@ class Bounds:
 
 @functools.cache
 def bubblewrap() -> tuple[str, ...] | None:
-    """A bubblewrap that works here with what isolates it most, or None: in some containers it may do nothing."""
+    """A bubblewrap that works here with what isolates it most, or None: in some containers it may not do enough."""
     path = shutil.which("bwrap")
     if path is None:
         return None
     for most in ((*ISOLATED, *NO_NESTS), ISOLATED):  # bubblewrap has NO_NESTS since 0.8
-        tried = subprocess.run([path, *most, "--ro-bind", "/", "/", "true"], capture_output=True, check=False)
+        tried = subprocess.run(
+            [path, *most, "--ro-bind", "/", "/", *SYSTEM_OF_ITS_OWN, "true"], capture_output=True, check=False
+        )
         if tried.returncode == 0:
             return (path, *most)
     return None
@@ -61,8 +65,8 @@ def require_sandbox() -> None:
     if bubblewrap() is None:
         raise InstructorError(
             "There is no sandbox here to run student code in. On Linux install bubblewrap (apt install bubblewrap); a "
-            "container must allow it to make namespaces. On Windows use WSL, on macOS a Linux machine. Or add "
-            "--no-sandbox: then what students have written can do whatever you can do on this machine."
+            "container must allow it to make namespaces. On macOS and Windows grade in a container, as README.md says. "
+            "Or add --no-sandbox: then what students have written can do whatever you can do on this machine."
         )
 
 
@@ -119,8 +123,7 @@ def _walled(folder: Path, examiner: str, bounds: Bounds, kernel: list[str]) -> l
             parts += ["--symlink", os.readlink(path), path]
         elif os.path.exists(path):
             parts += ["--ro-bind", path, path]
-    # Read-only, for where root grades, the settings of the whole machine are files of its own in /proc/sys.
-    parts += ["--proc", "/proc", "--remount-ro", "/proc", "--dev", "/dev", "--remount-ro", "/dev"]
+    parts += SYSTEM_OF_ITS_OWN
     for path in ("/dev/shm", "/tmp", HOME, f"{COURSE}/notebooks"):
         parts += ["--size", str(bounds.disk * MB), "--tmpfs", path]
     # After /tmp, for the environment or the job may lie in there.
