@@ -19,8 +19,9 @@ def test_what_is_kept_is_carried():
 
 
 def test_whole_numbers_are_carried_as_any_other():
-    carry.keep("radiance", np.arange(6).reshape(2, 3))
-    assert np.array_equal(carry.carry("radiance", (2, 3), lambda: None), [[0, 1, 2], [3, 4, 5]])
+    for whole in ([[0, 1, 2], [3, 4, 5]], np.arange(6).reshape(2, 3)):
+        carry.keep("radiance", whole)
+        assert np.array_equal(carry.carry("radiance", (2, 3), lambda: None), [[0, 1, 2], [3, 4, 5]])
 
 
 def test_what_the_courses_function_made_in_the_place_of_a_todos_is_not_kept_as_the_students():

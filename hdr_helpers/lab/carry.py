@@ -26,7 +26,8 @@ def keep(name: str, array, made_by=None) -> None:
         return
     RESULTS.mkdir(exist_ok=True)
     content = io.BytesIO()
-    np.save(content, np.asarray(array, dtype=np.result_type(array, np.float32)))
+    array = np.asarray(array)
+    np.save(content, array.astype(np.result_type(array, np.float32)))
     write_whole(RESULTS / f"{name}.npy", content.getvalue())
     print(f"Kept for the next notebooks: {name}.npy")
 
