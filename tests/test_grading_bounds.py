@@ -188,16 +188,26 @@ def test_without_a_sandbox_a_submission_is_graded(tmp_path):
     assert ada.todos and all(todo.state == "right" for todo in ada.todos) and not ada.all_flags
 
 
+LEFT_OUT = "Cell 4 was left out, because it ended the kernel."
+
+
 @sandboxed
-def test_what_comes_after_the_time_of_a_notebook_is_over_is_not_run_and_what_came_before_counts(tmp_path):
+@pytest.mark.parametrize(
+    "last, flags",
+    [
+        ("", ["It took more than 20 seconds; cell 5 and later were not run."]),
+        ("import os\nos._exit(3)", [LEFT_OUT, "It took more than 20 seconds, and was not run again."]),
+    ],
+)
+def test_what_comes_after_the_time_of_a_notebook_is_not_run_and_what_came_before_counts(last, flags, tmp_path):
     source = shorter_course(tmp_path / "source")[:1]
-    Student(source).insert("todo-3-2", "import time\ntime.sleep(20)").hand_in(tmp_path / "in" / "ada")
+    Student(source).insert("todo-3-2", f"import time\ntime.sleep(20)\n{last}").hand_in(tmp_path / "in" / "ada")
     options = Options(bounds=Bounds(notebook=20))
     (ada,) = grade(tmp_path / "in", tmp_path / "out", options, say=lambda _: None, notebooks=source)
     assert [todo.state for todo in ada.todos] == ["right", "unasked", "unasked"]
     assert ada.todos[1].said == ["The check was not reached, because the notebook was stopped before."]
     assert ada.notebooks[0].kind == "stopped"
-    assert ada.notebooks[0].flags == ["It took more than 20 seconds; cell 5 and later were not run."]
+    assert ada.notebooks[0].flags == flags
 
 
 @pytest.fixture

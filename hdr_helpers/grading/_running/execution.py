@@ -21,7 +21,7 @@ from hdr_helpers.lab.checks._examined import TICKET
 from hdr_helpers.lab.checks._running import shortened
 
 BEGINNING = "get_ipython().ask_exit = lambda: None"  # exit() ends a kernel a moment later, in some other cell
-PRELUDE = f"from hdr_helpers.lab.checks import check, hint\n__import__('os').environ['{TICKET}'] = {{!r}}"
+PRELUDE = "from hdr_helpers.lab.checks import check, hint\n__import__('os').environ[{!r}] = {!r}"
 ENDINGS = {
     "dead": "it ended the kernel",
     "memory": "it took more than {memory} MB of memory",
@@ -78,7 +78,10 @@ class ExecuteSubmission(Execute):
         )
         try:
             while not self._runs_to_its_end(nb, resources):  # each run leaves one thing more out
-                pass
+                if time.monotonic() > self.deadline:
+                    task.stopped = True
+                    task.flags.append(f"It took more than {task.bounds.notebook:g} seconds, and was not run again.")
+                    break
         finally:
             self.examiner.close()
         task.results = self.examiner.results
@@ -148,7 +151,7 @@ class ExecuteSubmission(Execute):
             self.fresh = False
             self._run_our_own(BEGINNING, index)
         if number:  # a student may have used the name for something else
-            self._run_our_own(PRELUDE.format(ticket), index)
+            self._run_our_own(PRELUDE.format(TICKET, ticket), index)
         cell, resources = super().preprocess_cell(cell, resources, index)
         if any(output.get("ename") == "CellTimeoutError" for output in cell.get("outputs", ())):
             self.task.flags.append(f"Cell {index + 1} was interrupted after {self.timeout} seconds.")
