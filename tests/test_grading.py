@@ -22,7 +22,7 @@ if find_spec("nbgrader") is None:
     pytest.skip("nbgrader is not installed: the instructor extra", allow_module_level=True)
 
 from hdr_helpers.grading.__main__ import main
-from hdr_helpers.grading._running.sandbox import Bounds, bubblewrap
+from hdr_helpers.grading._running.sandbox import bubblewrap
 from hdr_helpers.grading.grade import Options, grade
 from hdr_helpers.grading.gradebook import gradebook
 from hdr_helpers.grading.release import release
@@ -33,12 +33,11 @@ for stage in ("load", "align", "crf", "system", "curves", "merge", "tonemap"):
     importlib.import_module(f"mistakes.{stage}")
 
 SANDBOXED = bubblewrap() is not None
-BOUNDS = Bounds(cell=20, notebook=120, check=10)
 FULL = {number: most_points(number) for number in sorted(TODOS) if number[0] in "34"}
 
 
 def options(**changes):
-    return Options(**{"bounds": BOUNDS, "sandboxed": SANDBOXED} | changes)
+    return Options(**{"sandboxed": SANDBOXED} | changes)
 
 
 def points(student):
@@ -253,7 +252,7 @@ def test_the_whole_course_with_all_solutions_gets_every_point_and_the_empty_stud
     shutil.copytree(edition / "notebooks", tmp_path / "in" / "empty")
     fill_in(edition)
     shutil.copytree(edition / "notebooks", tmp_path / "in" / "solved")
-    students = {one.student: one for one in grade(tmp_path / "in", tmp_path / "out", options(bounds=Bounds()), Said())}
+    students = {one.student: one for one in grade(tmp_path / "in", tmp_path / "out", options(), Said())}
     assert points(students["solved"]) == {number: most_points(number) for number in TODOS}
     assert points(students["empty"]) == dict.fromkeys(TODOS, 0.0)
     for student in students.values():

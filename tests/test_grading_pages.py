@@ -10,7 +10,7 @@ from short_course import Student, short_course
 if find_spec("nbgrader") is None:
     pytest.skip("nbgrader is not installed: the instructor extra", allow_module_level=True)
 
-from hdr_helpers.grading._running.sandbox import Bounds, bubblewrap
+from hdr_helpers.grading._running.sandbox import bubblewrap
 from hdr_helpers.grading.grade import Options, grade
 
 SHOWN = r"""
@@ -73,7 +73,7 @@ def pages(tmp_path_factory):
         }
     )
     student.hand_in(folder / "in" / "eve")
-    options = Options(bounds=Bounds(cell=20, notebook=120), sandboxed=bubblewrap() is not None)
+    options = Options(sandboxed=bubblewrap() is not None)
     grade(folder / "in", folder / "out", options, lambda sentence: None, sources)
     return folder / "out"
 
