@@ -1,17 +1,19 @@
 """A kernel for student code: in the sandbox, if there is one, and watched while it runs."""
 
 import os
+import shutil
 import stat
 import threading
 import time
 from contextlib import suppress
 from pathlib import Path
 
+import matplotlib.font_manager
 import psutil
 from jupyter_client.kernelspec import KernelSpec
 from jupyter_client.manager import AsyncKernelManager
 
-from hdr_helpers.grading._running.sandbox import LINE, MB, Bounds, kernel_command
+from hdr_helpers.grading._running.sandbox import FONTS, LINE, MB, Bounds, kernel_command
 
 LOOK = 0.2  # seconds between two looks at what a kernel uses
 BLOCK = 4096  # bytes
@@ -23,7 +25,9 @@ def kernel_manager(folder: Path, examiner: str, bounds: Bounds, sandboxed: bool)
     line = folder / LINE
     if sandboxed and line.exists():  # whatever an earlier kernel has left in there, no process outside looks at it
         line.rename(folder / f"left-{time.monotonic_ns()}")
-    line.mkdir(parents=True, exist_ok=True)
+    (line / FONTS).mkdir(parents=True, exist_ok=True)
+    for known in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):  # else each kernel looks for all fonts anew
+        shutil.copy(known, line / FONTS)
     manager = AsyncKernelManager(kernel_name="python3", connection_file=str(line / "kernel.json"))
     if sandboxed:  # there is no network in there, and signals do not get in
         manager.transport, manager.ip = "ipc", str(line / "kernel")

@@ -21,6 +21,7 @@ SETTINGS = ("/etc/ld.so.cache", "/etc/ld.so.conf", "/etc/fonts", "/etc/alternati
 COURSE, HOME = "/course", "/home/student"
 FILTER = "9"  # number under which bubblewrap finds the filter of calls opened
 LINE, SCRATCH = "line", "scratch"  # folders of a job that its kernel gets: one to speak in, one to read from
+FONTS = "fonts"  # in LINE: matplotlib's list of fonts
 ISOLATED = ("--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL")
 NO_NESTS = ("--unshare-user", "--disable-userns")  # no namespaces within, in which a student could mount things
 # Read-only, for where root grades, the settings of the whole machine are files of its own in /proc/sys.
@@ -74,7 +75,7 @@ def kernel_command(folder: Path, examiner: str, bounds: Bounds, sandboxed: bool)
     """How a kernel is started: its command for a kernelspec, its environment, and the folder it starts in.
 
     examiner : address of the examiner of its checks
-    folder : holds LINE (the kernel's sockets, and matplotlib's cache of fonts) and SCRATCH (the examiner's)
+    folder : holds LINE (the kernel's sockets, and FONTS) and SCRATCH (the examiner's)
     """
     kernel = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
     if sandboxed:
@@ -98,7 +99,7 @@ def _environment(folder: Path, examiner: str, course: str) -> dict[str, str]:
         EXAMINER: examiner,
         MUST_PASS: "0",
         "HDR_RESULTS": "results",
-        "MPLCONFIGDIR": str(folder / LINE / "fonts"),
+        "MPLCONFIGDIR": str(folder / LINE / FONTS),
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
         "PYTHONPATH": course,
