@@ -32,6 +32,7 @@ from pathlib import Path
 c = get_config()  # noqa: F821  nbgrader provides it
 c.CourseDirectory.root = str(Path(__file__).parent)
 """
+FEW = 10  # pages of feedback; to start processes for no more takes longer than to write them
 
 
 @dataclass(frozen=True)
@@ -219,7 +220,7 @@ def _write_feedback(out, stale, workers, say) -> None:
     say(f"Writing feedback for {len(stale)} students.")
     names = [[name for name, _ in pages] for pages in stale.values()]
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        spread = pool.map if len(stale) > 1 else map  # a process for one student takes longer than the pages
+        spread = pool.map if sum(map(len, names)) > FEW else map
         for (student, pages), done in zip(stale.items(), spread(partial(feedback, out), stale, names), strict=True):
             for name, facts in pages:
                 if name in done:
