@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from packaging.markers import Marker
 
 from hdr_helpers.lab.checks import most_points
 
@@ -184,7 +185,9 @@ def test_the_readmes_test_command_is_what_ci_runs():
 
 def test_the_environment_is_the_seven_packages_pinned_and_the_course_itself():
     lines = [line for line in (ROOT / "environment.txt").read_text().splitlines() if not line.startswith("#")]
-    names = [line.split("==")[0] for line in lines if re.fullmatch(r"[\w-]+==[\d.]+", line)]
+    pinned = [re.fullmatch(r"([\w-]+)==[\d.]+(?:; (python_version (?:<|>=) \"3\.15\"))?", line) for line in lines[:-1]]
     seven = ["numpy", "scipy", "opencv-python-headless", "matplotlib", "jupyterlab", "nbval", "ipywidgets"]
-    assert names == seven
-    assert lines[len(seven) :] == ["-e ."]
+    for python in ("3.11", "3.15"):  # lowest and newest: each package once
+        here = [pin[1] for pin in pinned if not pin[2] or Marker(pin[2]).evaluate({"python_version": python})]
+        assert here == seven
+    assert lines[-1] == "-e ."
