@@ -23,7 +23,6 @@ import numpy as np
 
 KEPT = 2000  # characters of what a function prints; the rest is dropped
 AGAIN = 0.01  # seconds after which a function that swallowed the time limit is told again
-NOTHING = {"RESUME", "NOP", "LOAD_CONST", "RETURN_VALUE", "RETURN_CONST"}  # all that an empty body compiles to
 PATIENCE = 100  # times that a thread is told to end before it is left alone
 
 
@@ -204,9 +203,12 @@ def name_of(function) -> str:
 def returns_only_none(function) -> bool:
     """Whether a function's code does nothing but return None, as pass or a docstring alone does."""
     code = getattr(function, "__code__", None)
-    if code is None:
-        return False
-    return {step.opname for step in dis.get_instructions(code)} <= NOTHING
+    return code is not None and _steps(code) <= _steps((lambda: None).__code__) | {("NOP", None)}
+
+
+def _steps(code) -> set[tuple]:
+    """What a function compiles to, which every Python does otherwise."""
+    return {(step.opname, step.argval) for step in dis.get_instructions(code)}
 
 
 def same(these, those) -> bool:
