@@ -159,6 +159,17 @@ def test_the_examiners_address_can_be_asked_but_not_taken(tmp_path, monkeypatch)
         examiner.close()
 
 
+@sandboxed
+def test_a_kernel_has_the_list_of_fonts_and_does_not_make_it_anew(tmp_path):
+    with Kernel(tmp_path) as kernel:
+        found = list((kernel.line / "fonts").glob("fontlist-*.json"))
+        before = [path.stat().st_mtime_ns for path in found]
+        find = "from matplotlib import font_manager\nreturn font_manager.findfont('DejaVu Sans').endswith('.ttf')"
+        assert kernel.attempt(find) == ("got", True)
+        after = list((kernel.line / "fonts").glob("fontlist-*.json"))
+        assert found and after == found and [path.stat().st_mtime_ns for path in after] == before
+
+
 def test_what_kernels_have_left_is_removed_however_deep_or_closed_it_is(tmp_path):
     (tmp_path / "kernels" / "line").mkdir(parents=True)
     (tmp_path / "kept").write_text(SECRET)
